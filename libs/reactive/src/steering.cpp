@@ -51,7 +51,7 @@ void Steering::restart() {
   phase_ = Phase::idle;
   turn_.left_s = 0.0;
   begun_s_ = -endless;
-  sideways_count_ = index_ = rounds_ = 0;
+  sideways_count_ = index_ = looks_in_vain_ = 0;
   stall_count_ = 0;
   overall_.distance = standing_.distance = predicted_.distance = endless;
   arrives_ = false;
@@ -79,7 +79,7 @@ bool Steering::Best::improves(double candidate, double time_s) {
 
 // Where the arm stands at a balance of attraction and what blocks it.
 void Steering::note_stall(double time_s, const Eigen::VectorXd& q, double distance) {
-  if (overall_.improves(distance, time_s)) rounds_ = 0;
+  if (overall_.improves(distance, time_s)) looks_in_vain_ = 0;
   if (turn_.on()) {
     standing_ = {std::min(distance, standing_.distance), time_s};
   } else if (!standing_.improves(distance, time_s) && time_s - standing_.since_s > stall_after_s) {
@@ -163,6 +163,7 @@ void Steering::try_next() {
 
 void Steering::finish_look() {
   phase_ = Phase::idle;
+  if (tried_ > 0) ++looks_in_vain_;
   if (found_) turn_ = best_turn_;
 }
 
@@ -174,7 +175,6 @@ void Steering::draw_candidate() {
   candidate_.left_s = 0.0;
   if (all == 0) return;
   const int round = index_ / all, i = index_ % all;
-  if (i == all - 1) ++rounds_;
   ++index_;
   const auto r = static_cast<std::size_t>(round);
   const auto k = static_cast<std::size_t>(i);

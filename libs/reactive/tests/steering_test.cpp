@@ -130,11 +130,11 @@ TEST_CASE("steering tells when all that it knows was in vain", "[reactive][steer
   test::ReactiveScene scene(task);
   Steering steering(scene.planner_host(), scene.setup, scene.model, test::law_params, scene.margins,
                     {});
-  CHECK(steering.rounds_in_vain() == 0);
+  CHECK(steering.looks_in_vain() == 0);
   const VectorXd q = VectorXd::Zero(4);
   for (int k = 0; k < 20000; ++k) steering.advance(0.004 * k, q, 1.2, scene.goal(), false);
-  CHECK(steering.rounds_in_vain() > 20);
+  CHECK(steering.looks_in_vain() > 20);
   CHECK(steering.in_vain_since_s() == 0.0);
   steering.restart();
-  CHECK(steering.rounds_in_vain() == 0);
+  CHECK(steering.looks_in_vain() == 0);
 }

@@ -13,8 +13,6 @@ constexpr double joint_gain = 4.0, tip_gain = 3.0, tip_speed_m_s = 0.5, tip_turn
 // [rad/s² or m/s²]. The difference from acceleration_max is a reserve for obstacles.
 constexpr double velocity_gain = 10.0, drive_acceleration = 6.0, acceleration_max = 15.0;
 constexpr int filter_passes = 12;
-// So often all turns are tried in vain before the arm gives up.
-constexpr int rounds_max = 40;
 // What is kept of obstacles [m]: far from the goal, at a goal of the tip, and how much less than
 // the clearance there at a goal of the joints; between parts of the arm.
 constexpr double full_margin_m = 0.01, goal_margin_m = 0.003, self_margin_m = 0.005,
@@ -93,7 +91,7 @@ void PredictedTurn::check_end(const planning::Tick& tick, planning::Command& com
     return rest_.check(tick, law_.within(model_, drive_.ws(), drive_.q(), tick.goal(), 1.0),
                        command);
   command.disable_stall_rule();
-  if (steering_->rounds_in_vain() >= rounds_max)
+  if (steering_->looks_in_vain() >= reactive::Steering::looks_enough)
     command.give_up("force balance: no turn that was predicted leads nearer to the goal");
 }
 

@@ -486,9 +486,8 @@ class Hybrid final : public planning::Planner {
   // knows many times.
   [[nodiscard]] bool steers_on(double now) const {
     constexpr double steered_s = 10.0;
-    constexpr int rounds = 40;
     if (mode_ != Mode::goal || !path_.empty()) return false;
-    if (!uses_memory_ && !search_) return steering_->rounds_in_vain() < rounds;
+    if (!uses_memory_ && !search_) return steering_->looks_in_vain() < Steering::looks_enough;
     return (steering_->turn().on() || steering_->arrives()) &&
            now - steering_->in_vain_since_s() < steered_s;
   }

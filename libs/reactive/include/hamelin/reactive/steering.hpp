@@ -38,8 +38,10 @@ class Steering {
   void apply(const Eigen::MatrixXd& M, Eigen::VectorXd& u);
   /// Whether the present course arrives, as was predicted last.
   [[nodiscard]] bool arrives() const noexcept { return arrives_; }
-  /// How often all candidates were tried in vain since the distance had its last new best.
-  [[nodiscard]] int rounds_in_vain() const noexcept { return rounds_; }
+  /// Looks that tried candidates since the distance had its last new best.
+  [[nodiscard]] int looks_in_vain() const noexcept { return looks_in_vain_; }
+  /// So many looks in vain, of at least 8 s, try all of a long list about 40 times.
+  static constexpr int looks_enough = 160;
   /// Since when the distance has had no new best [s].
   [[nodiscard]] double in_vain_since_s() const noexcept { return overall_.since_s; }
   /// Postures that were predicted.
@@ -89,7 +91,8 @@ class Steering {
   Turn none_;
   Eigen::MatrixXd sideways_;
   int sideways_count_ = 0;
-  int index_ = 0, rounds_ = 0;  ///< of the cyclic list of candidates
+  int index_ = 0;  ///< of the cyclic list of candidates
+  int looks_in_vain_ = 0;
   bool arrives_ = false;
   std::vector<Eigen::VectorXd> stalls_;
   std::size_t stall_count_ = 0;
