@@ -12,8 +12,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Attraction near a goal of the joints and of the tip [1/s], and its speeds towards one of the tip.
-constexpr double joint_gain = 4.0, tip_gain = 3.0, tip_speed_m_s = 0.5, tip_turn_rad_s = 1.5;
 // Gain with which the velocity follows the attraction [1/s], and its largest joint acceleration
 // [rad/s² or m/s²]. The difference from acceleration_max is a reserve for obstacles.
 constexpr double velocity_gain = 20.0, drive_acceleration = 10.0, acceleration_max = 15.0;
@@ -53,29 +51,24 @@ FieldDrive::FieldDrive(const planning::Setup& setup, const FieldDriveParams& par
       ws_(model_),
       horizon_s_(setup.sampled() ? std::max(sampled_horizon_s, setup.control_period_s())
                                  : setup.control_period_s()),
-      law_(setup, model_,
-           {joint_gain, tip_gain, params.cruise_speed, tip_speed_m_s, tip_turn_rad_s, 0.0, 0.0}),
+      law_(setup, model_, {.cruise_speed = params.cruise_speed}),
+      inertia_(setup.dof()),
       obstacles_(setup, contact_range_m(params.range_m)),
       disturbance_(setup.dof()) {
   const int n = setup.dof();
   for (auto* x : {&q_, &v_, &a_, &row_, &Wa_, &turning_, &turned_, &torque_})
     *x = Eigen::VectorXd::Zero(n);
-  M_ = W_ = identity_ = Eigen::MatrixXd::Identity(n, n);
-  llt_.compute(identity_);  // allocates its memory
   J_.setZero(3, n);
 }
 
 void FieldDrive::update(const planning::Tick& tick) {
   q_ = tick.q();
   v_ = tick.v();
-  dynamics::mass_matrix(model_, ws_, q_, M_);
-  llt_.compute(M_);
-  W_ = identity_;
-  llt_.solveInPlace(W_);
+  inertia_.update(model_, ws_, q_);
   dynamics::forward_kinematics(model_, ws_, q_);
   obstacles_.update(model_, ws_, tick.contacts(), tick.self_contacts());
   turning_.setZero();
-  disturbance_.take(tick, setup_, M_);
+  disturbance_.take(tick, setup_, inertia_.M());
   attract(tick);
 }
 
@@ -100,7 +93,7 @@ Eigen::Matrix3d FieldDrive::inertia(const NearPoint& point) {
 }
 
 void FieldDrive::push(const NearPoint& point, double f) {
-  Wa_.noalias() = W_ * point.row;
+  Wa_.noalias() = inertia_.W() * point.row;
   a_ += f / (point.row.dot(Wa_) + least_mobility) * Wa_;
 }
 
@@ -121,7 +114,7 @@ void FieldDrive::turn(const NearPoint& point, const Vector3d& w, planning::Comma
 
 void FieldDrive::pull(const NearPoint& point, const Vector3d& force) {
   dynamics::point_jacobian_transpose(model_, ws_, point.link, point.arm_point, force, row_);
-  a_.noalias() += W_ * row_;
+  a_.noalias() += inertia_.W() * row_;
 }
 
 // docs/theory.md (9.24)
@@ -149,7 +142,7 @@ double FieldDrive::joint_room(double offset) const {
 // joints bound them.
 void FieldDrive::bound_acceleration() {
   scale_to(acceleration_max, a_);
-  turned_.noalias() = W_ * turning_;
+  turned_.noalias() = inertia_.W() * turning_;
   const auto lower = setup_.q_lower(), upper = setup_.q_upper(), fastest = setup_.velocity_max();
   for (int k = 0; k < setup_.dof(); ++k) {
     const double most = fastest ? speed_share * (*fastest)[k] : infinity;

@@ -15,6 +15,8 @@ using Eigen::VectorXd;
 constexpr double row_brake_share = 0.6;      // of the braking room that one row counts on
 constexpr double row_brake_least = 0.3;      // braking that every row counts on [m/s²]
 constexpr double momentum_box_share = 0.98;  // of the torque limits
+// A joint beyond its limit goes back at this rate [1/s].
+constexpr double limit_leaving_rate = 8.0;
 constexpr int rows_max = 4 * Obstacles::max_points;
 
 }  // namespace
@@ -26,6 +28,7 @@ FilterDrive::FilterDrive(const planning::Setup& setup, const model::Model& model
       ws_(model),
       radius_(radius_m),
       horizon_s_(setup.control_period_s()),
+      inertia_(setup.dof()),
       obstacles_(setup, radius_m),
       filter_(setup.dof(), rows_max),
       disturbance_(setup.dof()) {
@@ -37,32 +40,27 @@ FilterDrive::FilterDrive(const planning::Setup& setup, const model::Model& model
   const int n = setup.dof();
   for (auto* x : {&q_, &v_, &w_, &x_, &bias_, &lower_, &upper_, &scratch_, &torque_, &last_torque_})
     *x = VectorXd::Zero(n);
-  M_ = M_inv_ = identity_ = Eigen::MatrixXd::Identity(n, n);
-  llt_.compute(identity_);  // allocates its memory
 }
 
 void FilterDrive::update(const planning::Tick& tick) {
   q_ = tick.q();
   v_ = tick.v();
-  dynamics::mass_matrix(model_, ws_, q_, M_);
-  llt_.compute(M_);
-  M_inv_ = identity_;
-  llt_.solveInPlace(M_inv_);
+  inertia_.update(model_, ws_, q_);
   dynamics::bias_torque(model_, ws_, q_, v_, bias_);
   last_torque_ = tick.torque() ? *tick.torque() : planning::ConstVectorMap(bias_.data(), q_.size());
-  disturbance_.take(tick, setup_, M_);
+  disturbance_.take(tick, setup_, inertia_.M());
   w_ = v_;
   if (ramp_) {
     scratch_ = bias_ - disturbance_.torque;
-    ramp_->update(last_torque_, scratch_, M_inv_, v_);
+    ramp_->update(last_torque_, scratch_, inertia_.W(), v_);
     w_ = ramp_->coasting_velocity();
   }
   dynamics::forward_kinematics(model_, ws_, q_);
   obstacles_.update(model_, ws_, tick.contacts(), tick.self_contacts());
 }
 
-void FilterDrive::begin_filter(const Pace& pace) {
-  filter_.begin(M_, M_inv_);
+void FilterDrive::begin_boxes(const Pace& pace) {
+  filter_.begin(inertia_.M(), inertia_.W());
   set_joint_box(pace);
   set_momentum_box();
 }
@@ -105,10 +103,10 @@ std::pair<double, double> FilterDrive::joint_bounds(int k, const Pace& pace) con
 double FilterDrive::joint_approach(int k, double offset, double side, const Pace& pace) const {
   const double x = side * offset;
   if (!std::isfinite(x)) return side * std::numeric_limits<double>::infinity();
-  if (x <= 0.0) return side * Pace{}.joint_rate * x;
+  if (x <= 0.0) return side * limit_leaving_rate * x;
   if (!ramp_) return side * approach_speed(x, pace.joint_brake, pace.joint_rate);
   return side * approach_speed(x, pace.joint_brake, pace.joint_rate,
-                               ramp_->loss_of_joint(k, side, M_inv_, pace.joint_brake));
+                               ramp_->loss_of_joint(k, side, inertia_.W(), pace.joint_brake));
 }
 
 // Momenta within the torque limits, docs/theory.md (10.13). The bias torque is held at x, not at w;
@@ -116,7 +114,7 @@ double FilterDrive::joint_approach(int k, double offset, double side, const Pace
 void FilterDrive::set_momentum_box() {
   const auto effort = setup_.effort_max();
   if (!effort) return;
-  torque_.noalias() = M_ * w_;
+  torque_.noalias() = inertia_.M() * w_;
   scratch_ = bias_ - disturbance_.torque;
   lower_ = torque_ + horizon_s_ * (-momentum_box_share * *effort - scratch_);
   upper_ = torque_ + horizon_s_ * (momentum_box_share * *effort - scratch_);
@@ -133,7 +131,7 @@ void FilterDrive::add_point(const NearPoint& point, const Pace& pace, double sof
     const double room = filter_.braking_room(point.row, w_);
     const double brake = std::clamp(row_brake_share * room / dt, row_brake_least, pace.brake);
     const double speed =
-        ramp_ ? approach_speed(x, brake, pace.rate, ramp_->loss(point.row, M_inv_, brake))
+        ramp_ ? approach_speed(x, brake, pace.rate, ramp_->loss(point.row, inertia_.W(), brake))
               : approach_speed(x, brake, pace.rate);
     bound = std::min(point.obstacle_speed - speed, present + room);
   }
@@ -171,7 +169,7 @@ void FilterDrive::answer_by_velocity(planning::Command& command) {
 // docs/theory.md (10.22).
 void FilterDrive::answer_by_torque(planning::Command& command) {
   scratch_ = (x_ - w_) / horizon_s_ - disturbance_.acceleration;
-  torque_.noalias() = M_ * scratch_;
+  torque_.noalias() = inertia_.M() * scratch_;
   torque_ += bias_;
   if (const auto effort = setup_.effort_max())
     torque_ = torque_.cwiseMin(*effort).cwiseMax(-*effort);

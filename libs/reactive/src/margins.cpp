@@ -10,8 +10,21 @@ namespace {
 constexpr double smallest_m = 0.001, smallest_sampled_m = 0.003;
 // Least margins are so much wider than those of a shield.
 constexpr double least_beyond_shield_m = 0.001;
+constexpr double self_beyond_shield_m = 0.002;  // kept of the distance between parts besides
+constexpr double voxel_at_goal = 0.4;           // share of a voxel that is kept near a tip goal
 
 }  // namespace
+
+MarginParams margins_in_scene(const planning::Setup& setup, MarginParams wanted) {
+  // A map may lack objects that fill less than half of a voxel.
+  const double voxel = setup.map_resolution_m();
+  wanted.full_m = std::max(wanted.full_m, voxel);
+  wanted.goal_m = std::min(std::max(wanted.goal_m, voxel_at_goal * voxel), wanted.full_m);
+  wanted.slack_m = std::min(wanted.slack_m, wanted.full_m);
+  // Inside the margin of a shield, the arm could not leave its place.
+  wanted.self_m = std::max(wanted.self_m, setup.shield_self_margin_m() + self_beyond_shield_m);
+  return wanted;
+}
 
 Margins::Margins(const planning::Setup& setup, const MarginParams& params)
     : params_(params),

@@ -1,6 +1,5 @@
 #include "hamelin/reactive/prediction.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 
@@ -31,12 +30,11 @@ Prediction::Prediction(const planning::Setup& setup, const model::Model& model,
       params_(law),
       glide_(setup, model, margins, surroundings),
       turner_(setup.dof()),
-      ws_(model) {
+      ws_(model),
+      inertia_(setup.dof()) {
   const int n = setup.dof();
   q_ = u_ = end_ = Jt_ = turn_.direction = Eigen::VectorXd::Zero(n);
-  M_ = W_ = identity_ = Eigen::MatrixXd::Identity(n, n);
   J_.setZero(3, n);
-  llt_.compute(M_);  // allocates its memory
 }
 
 void Prediction::set_params(const LawParams& law) noexcept {
@@ -61,13 +59,11 @@ bool Prediction::step() {
   if (law_.within(model_, glide_.ws(), q_, *goal_, predicted_goal_share)) return finish(true);
   const double distance = law_.distance(model_, glide_.ws(), q_, {goal_});
   if (!turn_.on()) note_distance(distance);
-  dynamics::mass_matrix(model_, ws_, q_, M_);
-  llt_.compute(M_);
-  W_ = identity_;
-  llt_.solveInPlace(W_);
+  inertia_.update(model_, ws_, q_);
   set_velocity();
   law_.repel(glide_.points(), std::min(1.0, distance), u_);
-  glide_.filter(law_.margin_weight(model_, glide_.ws(), q_, *goal_), M_, W_, u_);
+  glide_.filter(law_.margin_weight(model_, glide_.ws(), q_, *goal_), inertia_.M(), inertia_.W(),
+                u_);
   if (idle_ > predicted_idle_steps || ++step_ == steps_max) return finish(false);
   q_ += Glide::step_s * u_;
   turn_.left_s -= Glide::step_s;
@@ -87,7 +83,7 @@ void Prediction::note_distance(double distance) {
 void Prediction::set_velocity() {
   law_.attract(model_, glide_.ws(), q_, {goal_}, u_);
   if (!turn_.on()) return;
-  turner_.apply(turn_, M_, params_.cruise_speed, u_);
+  turner_.apply(turn_, inertia_.M(), params_.cruise_speed, u_);
 }
 
 int Prediction::sideways(Eigen::MatrixXd& directions) {
@@ -106,9 +102,9 @@ int Prediction::sideways(Eigen::MatrixXd& directions) {
     const Eigen::Vector3d t = point.direction.unitOrthogonal();
     dynamics::point_jacobian(model_, glide_.ws(), point.link, point.arm_point, J_);
     Jt_.noalias() = J_.transpose() * t;
-    directions.col(count++).noalias() = W_ * Jt_;
+    directions.col(count++).noalias() = inertia_.W() * Jt_;
     Jt_.noalias() = J_.transpose() * point.direction.cross(t);
-    directions.col(count++).noalias() = W_ * Jt_;
+    directions.col(count++).noalias() = inertia_.W() * Jt_;
   }
   return count;
 }

@@ -27,6 +27,11 @@ constexpr std::array turn_angles{std::numbers::pi / 2, std::numbers::pi / 3,
 
 }  // namespace
 
+TurnKinds turn_kinds(std::string_view name) {
+  if (name == "tangents") return TurnKinds::tangents;
+  return name == "axes" ? TurnKinds::axes : TurnKinds::all;
+}
+
 Steering::Steering(const planning::Host& host, const planning::Setup& setup,
                    const model::Model& model, const LawParams& law, const Margins& margins,
                    const SteeringParams& params)

@@ -37,8 +37,7 @@ class PredictedTurn final : public planning::Planner {
   reactive::RestRule rest_;                     ///< without steering
   Eigen::VectorXd u_;
   std::int32_t series_ = -1;
-  std::uint64_t goal_number_ = 0;
-  bool started_ = false;
+  std::optional<std::uint64_t> goal_number_;  ///< none before the first tick
 };
 
 }  // namespace hamelin::gyro

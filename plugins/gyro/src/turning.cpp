@@ -13,7 +13,6 @@ namespace {
 Variant variant_named(const std::string& name) {
   if (name == "published") return Variant::published;
   if (name == "energy-neutral") return Variant::energy_neutral;
-  if (name == "predicted") return Variant::predicted;
   return name == "chang-marsden" ? Variant::chang_marsden : Variant::garimella;
 }
 

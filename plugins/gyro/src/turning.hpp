@@ -6,7 +6,7 @@
 
 namespace hamelin::gyro {
 
-enum class Variant { published, energy_neutral, chang_marsden, garimella, predicted };
+enum class Variant { published, energy_neutral, chang_marsden, garimella };
 
 /// How the velocity of an approaching point is turned away from an obstacle: the rate and the axis.
 class Turning {

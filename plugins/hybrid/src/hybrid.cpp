@@ -77,12 +77,6 @@ VectorXd lever_weights(const model::Model& model) {
   return (lever / (0.25 * std::max(1e-9, lever.maxCoeff()))).cwiseMin(1.0).cwiseMax(0.3);
 }
 
-TurnKinds turn_kinds(const Json& params) {
-  const std::string kinds = params["turns"];
-  if (kinds == "tangents") return TurnKinds::tangents;
-  return kinds == "axes" ? TurnKinds::axes : TurnKinds::all;
-}
-
 class Hybrid final : public planning::Planner {
  public:
   static constexpr std::uint32_t properties =
@@ -119,8 +113,9 @@ class Hybrid final : public planning::Planner {
         search_ = std::make_unique<Vias>(setup_, *rollout_, *roots_, box_);
     }
     if (params["steering"].get<bool>()) {
-      steering_ = std::make_unique<Steering>(host, setup_, model_, Tuning(setup, params).law,
-                                             margins_, SteeringParams{turn_kinds(params)});
+      steering_ = std::make_unique<Steering>(
+          host, setup_, model_, Tuning(setup, params).law, margins_,
+          SteeringParams{turn_kinds(params["turns"].get<std::string>())});
     }
     u_ = via_ = lower_ = upper_ = scratch_ = VectorXd::Zero(setup.dof());
     // Scenes in which nothing moves need no series.
@@ -198,7 +193,10 @@ class Hybrid final : public planning::Planner {
       closing_speed = law_.attract(model_, drive_.ws(), drive_.q(), target, u_);
       if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
       const double distance = law_.distance(model_, drive_.ws(), drive_.q(), target);
-      if (steering_ && mode_ == Mode::goal && path_.empty()) steer(tick, distance);
+      if (steering_ && mode_ == Mode::goal && path_.empty()) {
+        look_for_turns(tick, distance);
+        steering_->apply(drive_.M(), u_);
+      }
       law_.repel(drive_.points(), std::min(1.0, distance), u_);
     }
 
@@ -270,19 +268,17 @@ class Hybrid final : public planning::Planner {
 
   // Without a search, an arm that is kept from its target turns where that leads to it.
   [[nodiscard]] bool steers_to_target(double now) const {
-    return steering_ && !search_ && is_kept_from_target(now);
+    return steering_ && !search_ && was_held_from_target(now);
   }
   void turn_to_target(const planning::Tick& tick) {
-    steering_->advance(tick.time_s(), drive_.q(),
-                       law_.distance(model_, drive_.ws(), drive_.q(), {goal_}), *goal_,
-                       tick.moving_count() > 0);
+    look_for_turns(tick, law_.distance(model_, drive_.ws(), drive_.q(), {goal_}));
     if (!steering_->turn().on()) return;
     law_.attract(model_, drive_.ws(), drive_.q(), {goal_}, u_);
     u_ *= tick.speed_scale();
     steering_->apply(drive_.M(), u_);
     law_.repel(drive_.points(), 1.0, u_);
   }
-  [[nodiscard]] bool is_kept_from_target(double now) const {
+  [[nodiscard]] bool was_held_from_target(double now) const {
     return now - blocked_since_s_ > target_blocked_s;
   }
 
@@ -305,9 +301,8 @@ class Hybrid final : public planning::Planner {
   }
 
   // docs/theory.md (10.40)
-  void steer(const planning::Tick& tick, double distance) {
+  void look_for_turns(const planning::Tick& tick, double distance) {
     steering_->advance(tick.time_s(), drive_.q(), distance, *goal_, tick.moving_count() > 0);
-    steering_->apply(drive_.M(), u_);
   }
 
   void measure_margins() {
@@ -366,8 +361,7 @@ class Hybrid final : public planning::Planner {
   }
 
   void drive(planning::Command& command) {
-    drive_.begin_filter(pace());
-    drive_.add_points(pace(), [this](const NearPoint& point) {
+    drive_.begin_filter(pace(), [this](const NearPoint& point) {
       if (!evader_.moves(point.obstacle)) return 0.0;
       return evader_.has_rows() ? MoverRows::softness : -1.0;
     });
@@ -384,8 +378,9 @@ class Hybrid final : public planning::Planner {
     const double distance = law_.distance(model_, drive_.ws(), drive_.q(), {goal_});
     if (!search_) {
       if (steering_->turn().on() || is_held_from_target(distance)) return;
+      if (was_held_from_target(now)) steering_->restart();
       blocked_since_s_ = now;
-      return steering_->restart();
+      return;
     }
     if (mode_ == Mode::escape_path) {
       if (distance < target_away || escape_has_ended(now)) resume_target(now);
@@ -400,7 +395,7 @@ class Hybrid final : public planning::Planner {
       return enter(Mode::escape_path, now);
     }
     if (!is_held_from_target(distance)) blocked_since_s_ = now;
-    if (is_kept_from_target(now)) search_target(now);
+    if (was_held_from_target(now)) search_target(now);
   }
 
   [[nodiscard]] bool is_held_from_target(double distance) const {
@@ -567,7 +562,7 @@ class Hybrid final : public planning::Planner {
   Json initial_params_;
   Law law_;
   FilterDrive drive_;
-  dynamics::Workspace via_ws_;
+  dynamics::Workspace via_ws_;  ///< at way-points that are compared
   Surroundings surroundings_;
   Margins margins_;
   JointBox box_;

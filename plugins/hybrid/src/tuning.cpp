@@ -1,15 +1,12 @@
 #include "tuning.hpp"
 
-#include <algorithm>
 #include <array>
 
 namespace hamelin::hybrid {
 
 namespace {
 
-constexpr double beyond_shield_m = 0.002;  // what is kept of the distance between parts besides
 constexpr double joint_speed_share = 1.5;  // of the cruise speed, for |u| towards a target
-constexpr double voxel_at_goal = 0.4;      // share of a voxel that is kept near a tip goal
 
 // These determine the crop of the map, the kind of search, or the size of memory.
 constexpr std::array fixed{"contact_radius_m", "escape",   "search_budget", "max_escapes",
@@ -24,23 +21,18 @@ LawParams law_params(const Json& params, bool own_gains) {
   const double gain = !own_gains || params["k_p"].is_null()
                           ? 0.0
                           : params["k_p"].get<double>() / value_or(params["k_v"], 1.0);
-  return {gain > 0.0 ? gain : 4.0,      gain > 0.0 ? gain : 3.0,  params["cruise_speed"],
-          params["tip_speed_m_s"],      params["tip_turn_rad_s"], params["repulsion_range_m"],
+  return {gain > 0.0 ? gain : LawParams{}.joint_gain,
+          gain > 0.0 ? gain : LawParams{}.tip_gain,
+          params["cruise_speed"],
+          params["tip_speed_m_s"],
+          params["tip_turn_rad_s"],
+          params["repulsion_range_m"],
           params["repulsion_speed_m_s"]};
 }
 
 MarginParams margin_params(const planning::Setup& setup, const Json& params) {
-  MarginParams margins{};
-  // A map may lack objects that fill less than half of a voxel.
-  const double voxel = setup.map_resolution_m();
-  margins.full_m = std::max(params["margin_m"].get<double>(), voxel);
-  margins.goal_m = std::min(std::max(params["goal_margin_m"].get<double>(), voxel_at_goal * voxel),
-                            margins.full_m);
-  margins.slack_m = std::min(params["goal_margin_m"].get<double>(), margins.full_m);
-  // Inside the margin of a shield, the arm could not leave its place.
-  margins.self_m = std::max(params["self_margin_m"].get<double>(),
-                            setup.shield_self_margin_m() + beyond_shield_m);
-  return margins;
+  const double at_goal = params["goal_margin_m"];
+  return margins_in_scene(setup, {params["margin_m"], at_goal, at_goal, params["self_margin_m"]});
 }
 
 }  // namespace

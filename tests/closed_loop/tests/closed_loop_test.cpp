@@ -98,7 +98,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("a turn that is predicted leads past a ball, without work, where the same law rests",
+TEST_CASE("a turn that is predicted leads past a ball, where the same law without turns does not",
           "[simulation][energy]") {
   const TemporaryFolder folder;
   Json scene = scene_52();

@@ -1,11 +1,11 @@
 #pragma once
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <span>
 
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "hamelin/reactive/disturbance.hpp"
+#include "hamelin/reactive/inertia.hpp"
 #include "hamelin/reactive/law.hpp"
 #include "hamelin/reactive/obstacles.hpp"
 #include "hamelin/reactive/repulsion.hpp"
@@ -79,11 +79,10 @@ class FieldDrive {
   dynamics::Workspace ws_;
   double horizon_s_;  ///< within which the velocity bounds are reached
   Law law_;
+  Inertia inertia_;
   Obstacles obstacles_;
   Disturbance disturbance_;
   Eigen::VectorXd q_, v_, a_, row_, Wa_, turning_, turned_, torque_;
-  Eigen::MatrixXd M_, W_, identity_;
-  Eigen::LLT<Eigen::MatrixXd> llt_;
   dynamics::Matrix3Xd J_;
   double goal_distance_ = 0.0, goal_factor_ = 1.0;
   bool at_goal_ = false;

@@ -1,5 +1,4 @@
 #pragma once
-#include <Eigen/Cholesky>
 #include <optional>
 #include <span>
 #include <utility>
@@ -7,6 +6,7 @@
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "hamelin/reactive/disturbance.hpp"
+#include "hamelin/reactive/inertia.hpp"
 #include "hamelin/reactive/obstacles.hpp"
 #include "hamelin/reactive/safety_filter.hpp"
 #include "hamelin/reactive/torque_ramp.hpp"
@@ -21,14 +21,13 @@ struct Pace {
 };
 
 struct FilterDriveParams {
-  double acceleration_max;  ///< of the joints [rad/s² or m/s²]
-  int filter_passes;
+  double acceleration_max = 15.0;  ///< of the joints [rad/s² or m/s²]
+  int filter_passes = 12;
 };
 
 /// Drives an arm by a desired joint velocity under the safety filter, within the limits of joints
 /// and motors: docs/theory.md (10.7)–(10.23), (10.29)–(10.31). A tick calls update(), accelerate(),
-/// begin_filter(), add_points() and whatever else adds rows, then apply(). Only the constructor
-/// allocates.
+/// begin_filter() and whatever else adds rows, then apply(). Only the constructor allocates.
 class FilterDrive {
  public:
   /// @param radius_m obstacles beyond this distance are ignored
@@ -47,12 +46,11 @@ class FilterDrive {
   /// the velocity that the arm coasts to.
   [[nodiscard]] const Eigen::VectorXd& coasting_velocity() const noexcept { return w_; }
   /// The mass matrix and its inverse.
-  [[nodiscard]] const Eigen::MatrixXd& M() const noexcept { return M_; }
-  [[nodiscard]] const Eigen::MatrixXd& M_inv() const noexcept { return M_inv_; }
+  [[nodiscard]] const Eigen::MatrixXd& M() const noexcept { return inertia_.M(); }
+  [[nodiscard]] const Eigen::MatrixXd& M_inv() const noexcept { return inertia_.W(); }
   /// Contains the forward kinematics at q.
   [[nodiscard]] const dynamics::Workspace& ws() const noexcept { return ws_; }
   [[nodiscard]] std::span<NearPoint> points() noexcept { return obstacles_.points(); }
-  [[nodiscard]] double radius_m() const noexcept { return radius_; }
   [[nodiscard]] double horizon_s() const noexcept { return horizon_s_; }
   /// The bounds of a joint's velocity by its limits, where these are modelled.
   [[nodiscard]] std::pair<double, double> joint_bounds(int k, const Pace& pace) const;
@@ -63,23 +61,23 @@ class FilterDrive {
                   double acceleration) {
     x_ = w_ + horizon_s_ * (gain * (u - from)).cwiseMin(acceleration).cwiseMax(-acceleration);
   }
-  /// Sets the bounds of joints and torques, docs/theory.md (10.12), (10.13).
-  void begin_filter(const Pace& pace);
-  /// Adds the rows of the near points, docs/theory.md (10.11), (10.20).
+  /// Sets the bounds of joints and torques, and adds the rows of the near points: docs/theory.md
+  /// (10.11)–(10.13), (10.20).
   /// @param softness called with each point: that of its row, 0 for a hard one, below 0 for none
   template <class Softness>
-  void add_points(const Pace& pace, const Softness& softness) {
+  void begin_filter(const Pace& pace, const Softness& softness) {
+    begin_boxes(pace);
     for (const auto& point : obstacles_.points())
       if (const double soft = softness(point); soft >= 0.0) add_point(point, pace, soft);
   }
   [[nodiscard]] SafetyFilter& filter() noexcept { return filter_; }
-  [[nodiscard]] const SafetyFilter& filter() const noexcept { return filter_; }
   /// Projects the velocity, and commands what leads to it.
   void apply(planning::Command& command);
   /// Whether an obstacle is near, or the filter of the last apply() changed the velocity.
   [[nodiscard]] bool held_back() const noexcept { return held_back_; }
 
  private:
+  void begin_boxes(const Pace& pace);
   void add_point(const NearPoint& point, const Pace& pace, double softness);
   void set_joint_box(const Pace& pace);
   void set_momentum_box();
@@ -91,15 +89,14 @@ class FilterDrive {
   const planning::Setup setup_;
   const model::Model& model_;
   dynamics::Workspace ws_;
-  FilterDriveParams params_{15.0, 12};
+  FilterDriveParams params_;
   double radius_, horizon_s_;
+  Inertia inertia_;
   Obstacles obstacles_;
   SafetyFilter filter_;
   Disturbance disturbance_;
   std::optional<TorqueRamp> ramp_;  ///< only where the rate of the torque is limited
   Eigen::VectorXd q_, v_, w_, x_, bias_, lower_, upper_, scratch_, torque_, last_torque_;
-  Eigen::MatrixXd M_, M_inv_, identity_;
-  Eigen::LLT<Eigen::MatrixXd> llt_;
   bool held_back_ = false;
 };
 

@@ -7,11 +7,16 @@
 namespace hamelin::reactive {
 
 struct MarginParams {
-  double full_m;   ///< from obstacles, far from the goal
-  double goal_m;   ///< from obstacles, at a goal of the tip
-  double slack_m;  ///< by how much the margin at a joint goal is less than the clearance there
-  double self_m;   ///< between parts of the arm
+  double full_m = 0.01;   ///< from obstacles, far from the goal
+  double goal_m = 0.003;  ///< from obstacles, at a goal of the tip
+  double slack_m =
+      0.003;  ///< by how much the margin at a joint goal is less than the clearance there
+  double self_m = 0.005;  ///< between parts of the arm
 };
+
+/// Margins for a scene: at least a voxel of its map, near a goal of the tip 0.4 of one, and between
+/// parts of the arm more than its shield keeps.
+[[nodiscard]] MarginParams margins_in_scene(const planning::Setup& setup, MarginParams wanted);
 
 /// Margins that shrink near the goal, docs/theory.md (10.2), because goals are often closer to
 /// something than the arm should come elsewhere. At a joint goal the margin of a shape is its

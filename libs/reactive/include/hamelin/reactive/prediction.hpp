@@ -1,7 +1,6 @@
 #pragma once
-#include <Eigen/Cholesky>
-
 #include "hamelin/reactive/glide.hpp"
+#include "hamelin/reactive/inertia.hpp"
 #include "hamelin/reactive/law.hpp"
 #include "hamelin/reactive/turn.hpp"
 
@@ -56,8 +55,7 @@ class Prediction {
   int step_ = 0, idle_ = 0;
   double best_ = infinity;
   Eigen::VectorXd q_, u_, end_, Jt_;
-  Eigen::MatrixXd M_, W_, identity_;
-  Eigen::LLT<Eigen::MatrixXd> llt_;
+  Inertia inertia_;
   dynamics::Matrix3Xd J_;
 };
 

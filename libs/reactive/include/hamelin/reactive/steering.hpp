@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "hamelin/core/rng.hpp"
@@ -9,6 +10,8 @@ namespace hamelin::reactive {
 
 /// What a turn may be chosen from.
 enum class TurnKinds { tangents, axes, all };
+/// @param name that a parameter has for it
+[[nodiscard]] TurnKinds turn_kinds(std::string_view name);
 
 struct SteeringParams {
   TurnKinds kinds = TurnKinds::all;
