@@ -74,8 +74,8 @@ std::optional<Candidate> sphere_position(const JudgedArm& arm, const std::vector
 }
 
 // The unit direction in which the sphere swings: the first drawn that leaves enough room, else the
-// one that leaves most.
-Vector3d swing_direction(const JudgedArm& arm, const std::vector<VectorXd>& path,
+// one that leaves most; none if the sphere hits a part of the arm that cannot evade it in any.
+std::optional<Vector3d> swing_direction(const JudgedArm& arm, const std::vector<VectorXd>& path,
                          const Candidate& place, const SphereOnPath& options, Rng& rng) {
   constexpr int draws = 60, last_rooted_link = 1, samples = 10;
   constexpr double room_m = 0.06;
@@ -108,6 +108,7 @@ Vector3d swing_direction(const JudgedArm& arm, const std::vector<VectorXd>& path
       best = direction;
     }
   }
+  if (most < 0.0) return std::nullopt;
   return best;
 }
 
@@ -156,8 +157,13 @@ PathWithSphere place_sphere_on_path(const std::filesystem::path& scene_file,
                                options.clearance_m);
   } else {
     found.center = place->center;
-    if (options.swing_m > 0.0)
-      found.swing = options.swing_m * swing_direction(arm, found.path, *place, options, rng);
+    if (options.swing_m > 0.0) {
+      const auto direction = swing_direction(arm, found.path, *place, options, rng);
+      if (direction)
+        found.swing = options.swing_m * *direction;
+      else
+        found.reason = "the sphere would hit the foot of the arm in all directions";
+    }
   }
   found.path.erase(found.path.begin());  // the start is not a waypoint
   return found;

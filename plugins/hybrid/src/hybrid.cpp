@@ -481,13 +481,23 @@ class Hybrid final : public planning::Planner {
   // knows many times.
   [[nodiscard]] bool steers_on(double now) const {
     constexpr double steered_s = 10.0;
-    if (mode_ != Mode::goal || !path_.empty()) return false;
+    if (mode_ != Mode::goal) return false;
     if (!uses_memory_ && !search_) return steering_->looks_in_vain() < Steering::looks_enough;
     return (steering_->turn().on() || steering_->arrives()) &&
            now - steering_->in_vain_since_s() < steered_s;
   }
 
+  // Something that the path does not know bars it: turns lead past it and on to the goal.
+  void leave_path(double now) {
+    host_.info("stalled: turns lead on from the path");
+    path_.clear();
+    path_position_ = 0.0;
+    steering_->restart();
+    enter(Mode::goal, now);
+  }
+
   void start_escape(double now, const Target& target, planning::Command& command) {
+    if (steering_ && !path_.empty()) return leave_path(now);
     if (steering_ && steers_on(now)) return stall_.restart(now);
     if ((!uses_memory_ && !search_) || escapes_ >= max_escapes_) return command.give_up(cause());
     ++escapes_;
