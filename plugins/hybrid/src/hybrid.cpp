@@ -433,7 +433,7 @@ class Hybrid final : public planning::Planner {
 
   void check_stall(double now, const Target& target, double closing_speed,
                    planning::Command& command) {
-    if (uses_memory_ || search_ || steering_) command.disable_stall_rule();
+    if (searches() || steering_) command.disable_stall_rule();
     if (mode_ == Mode::search) return continue_search(now);
     if (!evader_.evades()) {
       evades_since_s_ = now;
@@ -481,11 +481,13 @@ class Hybrid final : public planning::Planner {
   // knows many times.
   [[nodiscard]] bool steers_on(double now) const {
     constexpr double steered_s = 10.0;
-    if (mode_ != Mode::goal) return false;
-    if (!uses_memory_ && !search_) return steering_->looks_in_vain() < Steering::looks_enough;
+    if (mode_ != Mode::goal || !path_.empty()) return false;
+    if (!searches()) return steering_->looks_in_vain() < Steering::looks_enough;
     return (steering_->turn().on() || steering_->arrives()) &&
            now - steering_->in_vain_since_s() < steered_s;
   }
+
+  [[nodiscard]] bool searches() const { return uses_memory_ || search_; }
 
   // Something that the path does not know bars it: turns lead past it and on to the goal.
   void leave_path(double now) {
@@ -497,9 +499,9 @@ class Hybrid final : public planning::Planner {
   }
 
   void start_escape(double now, const Target& target, planning::Command& command) {
-    if (steering_ && !path_.empty()) return leave_path(now);
+    if (steering_ && !searches() && !path_.empty()) return leave_path(now);
     if (steering_ && steers_on(now)) return stall_.restart(now);
-    if ((!uses_memory_ && !search_) || escapes_ >= max_escapes_) return command.give_up(cause());
+    if (!searches() || escapes_ >= max_escapes_) return command.give_up(cause());
     ++escapes_;
     std::array<char, 64> line{};
     const int size = std::snprintf(line.data(), line.size(), "stalled: escape %d", escapes_);
