@@ -489,7 +489,11 @@ class Hybrid final : public planning::Planner {
 
   [[nodiscard]] bool searches() const { return uses_memory_ || search_; }
 
-  // Something that the path does not know bars it: turns lead past it and on to the goal.
+  // Something that the path does not know bars it: turns lead past it and on to the goal. Where
+  // nothing moves, a search that rejoins the path is better.
+  [[nodiscard]] bool leaves_path() const {
+    return steering_ && !path_.empty() && (!searches() || evader_.active());
+  }
   void leave_path(double now) {
     host_.info("stalled: turns lead on from the path");
     path_.clear();
@@ -499,7 +503,7 @@ class Hybrid final : public planning::Planner {
   }
 
   void start_escape(double now, const Target& target, planning::Command& command) {
-    if (steering_ && !searches() && !path_.empty()) return leave_path(now);
+    if (leaves_path()) return leave_path(now);
     if (steering_ && steers_on(now)) return stall_.restart(now);
     if (!searches() || escapes_ >= max_escapes_) return command.give_up(cause());
     ++escapes_;
