@@ -76,7 +76,8 @@ std::optional<Candidate> sphere_position(const JudgedArm& arm, const std::vector
 // The unit direction in which the sphere swings: the first drawn that leaves enough room, else the
 // one that leaves most; none if the sphere hits a part of the arm that cannot evade it in any.
 std::optional<Vector3d> swing_direction(const JudgedArm& arm, const std::vector<VectorXd>& path,
-                         const Candidate& place, const SphereOnPath& options, Rng& rng) {
+                                        const Candidate& place, const SphereOnPath& options,
+                                        Rng& rng) {
   constexpr int draws = 60, last_rooted_link = 1, samples = 10;
   constexpr double room_m = 0.06;
   std::vector<Vector3d> before, after;
