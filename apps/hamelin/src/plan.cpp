@@ -24,7 +24,7 @@ struct PlanOptions {
 };
 
 std::string plan_text(const control::PlannedGoal& goal, std::size_t index) {
-  const guide::Path& path = goal.path;
+  const search::Path& path = goal.path;
   const std::string name = fmt::format("goal {}", index + 1);
   if (!path.found())
     return fmt::format("{:<12}{}: {}: {}, {} checks\n", name, goal.type,
@@ -35,7 +35,7 @@ std::string plan_text(const control::PlannedGoal& goal, std::size_t index) {
       "{:<12}{} checks, {} until the first path, which had the length {:.4g}; {:.3g} ms\n",
       name, goal.type, coloured("path", Colour::good), path.length, path.points.cols(), "",
       *std::min_element(goal.clearance_m.begin(), goal.clearance_m.end()), "", path.checks,
-      path.first_checks, guide::path_length(path.planned), 1e3 * goal.search_s);
+      path.first_checks, search::path_length(path.planned), 1e3 * goal.search_s);
 }
 
 int plan(PlanOptions options) {

@@ -182,7 +182,7 @@ class Drawer {
 }  // namespace
 
 ProblemSet draw_problem_set(const DrawOptions& options) {
-  if (!guide::available()) throw Error(ErrorCode::invalid, std::string(guide::why_unavailable()));
+  if (!search::available()) throw Error(ErrorCode::invalid, std::string(search::why_unavailable()));
   ProblemSet set;
   set.name = options.name;
   set.robot = options.robot;

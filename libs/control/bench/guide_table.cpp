@@ -33,7 +33,7 @@ double cpu_s() {
 }
 
 /// The same world with motions that are sampled, as OMPL does by default.
-class SampledQuery final : public guide::Query {
+class SampledQuery final : public search::Query {
  public:
   SampledQuery(control::GuideQuery& exact, double per_rad) : exact_(exact), per_rad_(per_rad) {}
   double clearance(const VectorXd& q, double at_least_m) override {
@@ -183,20 +183,20 @@ int run(int argc, char** argv) {
           scene::Scene& scene = rig->scene;
           scene.guide.type = type;
           scene.guide.improve_checks = 0;
-          guide::Settings settings = control::guide_settings(
+          search::Settings settings = control::guide_settings(
               scene, rig->arm, rig->view, {}, scene.planner ? scene.planner->params : Json());
           settings.seed = static_cast<std::uint64_t>(seed);
-          const guide::Guide guide(rig->arm, settings);
+          const search::Guide guide(rig->arm, settings);
           settings.shortens = false;
-          const guide::Guide first(rig->arm, settings);
+          const search::Guide first(rig->arm, settings);
           rig->query.refresh(0.0);
           SampledQuery sampling(rig->query, 32.0);
-          guide::Query& query = sampled ? static_cast<guide::Query&>(sampling) : rig->query;
-          const guide::Problem problem{scene.start_q, scene.goals.front(), 1};
+          search::Query& query = sampled ? static_cast<search::Query&>(sampling) : rig->query;
+          const search::Problem problem{scene.start_q, scene.goals.front(), 1};
           const double since = cpu_s();
           (void)first.search(problem, query);
           const double first_time = cpu_s() - since;
-          const guide::Path path = guide.search(problem, query);
+          const search::Path path = guide.search(problem, query);
           const double time = cpu_s() - since - first_time;
           ++f.searches;
           f.all_s += time;

@@ -1,4 +1,4 @@
-#include "guide/edge_check.hpp"
+#include "hamelin/search/edge_check.hpp"
 
 #include <catch2/catch.hpp>
 

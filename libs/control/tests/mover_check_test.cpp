@@ -131,7 +131,7 @@ TEST_CASE("what is proved clear of moving obstacles is clear by dense sampling",
   const scene::Scene scene = arm7_scene({ball, turning_box({0.3, 0.3, 0.6})});
   const model::Model model = control::load_model(scene);
   const scene::Environment environment = scene::make_environment(scene, model, 0.2);
-  const control::Levers levers(model, nullptr);
+  const scene::Levers levers(model, nullptr);
   MoverCheck check(model, levers);
   dynamics::Workspace ws(model);
   scene::PlacedShapes arm(model);
@@ -243,7 +243,7 @@ TEST_CASE("of an obstacle of bounded speed it is proved that the arm rests when 
   scene.obstacles = {ball};
   scene.safety.type = scene::SafetyType::shield;
   const scene::Environment environment = scene::make_environment(scene, model, 0.2);
-  const control::Levers levers(model, nullptr);
+  const scene::Levers levers(model, nullptr);
   MoverCheck check(model, levers);
   const std::vector<int> movers{0};
   // The hand moves towards the ball, or away from it, and takes long to stop.

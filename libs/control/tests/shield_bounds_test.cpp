@@ -15,11 +15,11 @@
 #include "shield/straying.hpp"
 
 using namespace hamelin;
-using control::Levers;
 using control::Shield;
 using control::StopMotion;
 using control::Straying;
 using Eigen::VectorXd;
+using scene::Levers;
 
 namespace {
 

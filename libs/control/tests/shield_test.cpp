@@ -109,7 +109,7 @@ TEST_CASE("bounds from anchors are below the distances themselves", "[shield][sl
   const model::Model model = control::load_model(scene);
   const scene::Environment environment = scene::make_environment(scene, model, 0.2);
   const scene::SelfField self(model);
-  const control::Levers levers(model, &self);
+  const scene::Levers levers(model, &self);
   LineCheck line(model, levers, &self);
   dynamics::Workspace ws(model);
   scene::PlacedShapes arm_from(model), arm_to(model), arm(model);
@@ -172,7 +172,7 @@ TEST_CASE("an arm that is nearer than its margin may only move away", "[shield]"
   ball.radius_m = 0.1;
   ball.pose = {Eigen::Matrix3d::Identity(), Eigen::Vector3d(-std::sin(0.3), std::cos(0.3), 0.0)};
   const scene::Environment environment(std::nullopt, {ball}, geometry::SE3{}, model.reach(), 0.5);
-  const control::Levers levers(model, nullptr);
+  const scene::Levers levers(model, nullptr);
   LineCheck line(model, levers, nullptr);
   dynamics::Workspace ws(model);
   scene::PlacedShapes arm_from(model), arm_to(model);

@@ -2,9 +2,9 @@
 #include <cmath>
 
 #include "hamelin/control/plan_paths.hpp"
-#include "hamelin/guide/guide.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/log/read_log.hpp"
+#include "hamelin/search/search.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/test/errors.hpp"
 #include "hamelin/test/guides.hpp"
@@ -127,7 +127,7 @@ TEST_CASE("plans have a certificate for each line and chain from goal to goal",
 
 TEST_CASE("a scene that asks for a guide says in one line that the build has none",
           "[closed_loop][guide]") {
-  test::skip_unless(!guide::available(), "this build has OMPL");
+  test::skip_unless(!search::available(), "this build has OMPL");
   CHECK(test::error_of([] { (void)run({connect}); })
             .ends_with("shelf.json: /planner/guide: is rrt-connect, which this build of hamelin is "
                        "without, expected none; to build with OMPL, install libompl-dev and "

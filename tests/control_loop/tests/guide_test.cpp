@@ -5,7 +5,7 @@
 #include "../loop.hpp"
 #include "guide/guidance.hpp"
 #include "guide/guide_search.hpp"
-#include "hamelin/guide/guide.hpp"
+#include "hamelin/search/search.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/guides.hpp"
 

@@ -1,7 +1,7 @@
 #include <cmath>
 
 #include "../program.hpp"
-#include "hamelin/guide/guide.hpp"
+#include "hamelin/search/search.hpp"
 #include "hamelin/test/guides.hpp"
 
 using namespace hamelin;
@@ -98,7 +98,7 @@ TEST_CASE("bad input of plan and of paths ends in one line", "[plan]") {
              Catch::Contains("path.json: /paths/3: has no way-points, expected a path that was "
                              "found"));
   CHECK_THAT(error(path_goal("path.json", 0)), Catch::Contains("2 values given, expected 7"));
-  if (guide::available()) return;
+  if (search::available()) return;
   CHECK(error(plan_shelf) ==
         "hamelin: data/scenes/shelf.json: /planner/guide: is rrt-connect, which this build of "
         "hamelin is without, expected none; to build with OMPL, install libompl-dev and configure "

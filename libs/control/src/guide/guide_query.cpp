@@ -58,16 +58,16 @@ double GuideQuery::proved_clearance(const VectorXd& a, const VectorXd& b) {
   return std::max(low, 1e-12);
 }
 
-guide::Settings guide_settings(const scene::Scene& scene, const model::Model& nominal,
-                               const WorldView& view, const LimitReserve& reserve,
-                               const Json& params) {
-  if (!guide::available())
+search::Settings guide_settings(const scene::Scene& scene, const model::Model& nominal,
+                                const WorldView& view, const LimitReserve& reserve,
+                                const Json& params) {
+  if (!search::available())
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: /planner/guide: is {}, which this build of hamelin is without, "
                             "expected none; to build with OMPL, install libompl-dev and configure "
                             "again",
                             scene.name, scene::to_string(scene.guide.type)));
-  guide::Settings out;
+  search::Settings out;
   out.type = scene.guide.type;
   const planning::SetupData setup = planner_setup(scene, nominal, view, scene.step_s, reserve);
   out.q_lower = setup.q_lower;

@@ -4,18 +4,18 @@
 #include <functional>
 #include <utility>
 
-#include "guide/edge_check.hpp"
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/world.hpp"
 #include "hamelin/control/world_view.hpp"
-#include "hamelin/guide/guide.hpp"
+#include "hamelin/search/edge_check.hpp"
+#include "hamelin/search/search.hpp"
 #include "world/world_query.hpp"
 
 namespace hamelin::control {
 
 /// A world as guides see it: the snapshot of the last refresh(), with obstacles where they are at
 /// its time. One thread.
-class GuideQuery final : public guide::Query {
+class GuideQuery final : public search::Query {
  public:
   /// All must outlive this.
   GuideQuery(const model::Model& model, const World& world, const WorldView& view);
@@ -51,7 +51,7 @@ class GuideQuery final : public guide::Query {
   }
 
   WorldQuery query_;
-  EdgeCheck edges_;
+  search::EdgeCheck edges_;
   double influence_, time_s_ = 0.0;
   long clearances_ = 0, calls_ = 0;
   std::function<void()> poll_;
@@ -62,8 +62,8 @@ class GuideQuery final : public guide::Query {
 /// @param reserve what a shield keeps
 /// @param params of the planner: guides keep somewhat more than its margin_m
 /// @throws Error invalid if the build has no OMPL
-[[nodiscard]] guide::Settings guide_settings(const scene::Scene& scene, const model::Model& nominal,
-                                             const WorldView& view, const LimitReserve& reserve,
-                                             const Json& params);
+[[nodiscard]] search::Settings guide_settings(const scene::Scene& scene,
+                                              const model::Model& nominal, const WorldView& view,
+                                              const LimitReserve& reserve, const Json& params);
 
 }  // namespace hamelin::control

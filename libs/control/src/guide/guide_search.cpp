@@ -15,7 +15,7 @@ GuideRequest::GuideRequest(Index dof, Index points_max)
 }
 
 GuideSearch::GuideSearch(const model::Model& model, const World& world, const WorldView& view,
-                         guide::Settings settings, Index points_max, bool threaded)
+                         search::Settings settings, Index points_max, bool threaded)
     : guide_(model, std::move(settings)),
       query_(model, world, view),
       request_(model.dof(), points_max),

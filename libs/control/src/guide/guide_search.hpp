@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "guide/guide_query.hpp"
-#include "hamelin/guide/guide.hpp"
+#include "hamelin/search/search.hpp"
 #include "loop/newest.hpp"
 
 namespace hamelin::control {
@@ -19,7 +19,7 @@ struct GuideRequest {
   double time_s = 0.0;       ///< of the tick
   Eigen::VectorXd q;         ///< where the search begins
   scene::Goal goal;
-  std::uint64_t search = 0;  ///< number of the search, see guide::Problem
+  std::uint64_t search = 0;  ///< number of the search, see search::Problem
   /// A path that is kept if it is still clear: its first kept_count columns; 0: none.
   Eigen::MatrixXd kept;
   Eigen::Index kept_count = 0;
@@ -30,7 +30,7 @@ struct GuideAnswer {
   std::uint64_t snapshot = 0;  ///< of the world that it is for
   bool kept = false;           ///< whether the path of the request is still clear
   long checks = 0;
-  guide::Path path;
+  search::Path path;
 };
 
 /// Answers the requests of a control loop, one at a time: on a thread of its own, or where its
@@ -41,7 +41,7 @@ class GuideSearch {
   /// @param threaded whether it has a thread of its own; else run() does the work
   /// model, world and view must outlive this
   GuideSearch(const model::Model& model, const World& world, const WorldView& view,
-              guide::Settings settings, Eigen::Index points_max, bool threaded);
+              search::Settings settings, Eigen::Index points_max, bool threaded);
   GuideSearch(const GuideSearch&) = delete;
   GuideSearch& operator=(const GuideSearch&) = delete;
   ~GuideSearch();
@@ -63,7 +63,7 @@ class GuideSearch {
   void answer();
   [[nodiscard]] bool still_clear();
 
-  guide::Guide guide_;
+  search::Guide guide_;
   GuideQuery query_;
   GuideRequest request_;
   Newest<GuideAnswer> answers_;

@@ -51,7 +51,7 @@ Json columns(const Eigen::MatrixXd& points) {
 }
 
 Json planned_json(const PlannedGoal& goal) {
-  const guide::Path& path = goal.path;
+  const search::Path& path = goal.path;
   Json out{{"type", goal.type},
            {"found", path.found()},
            {"cause", path.cause.empty() ? Json(nullptr) : Json(path.cause)},
@@ -62,7 +62,7 @@ Json planned_json(const PlannedGoal& goal) {
             {{"checks", path.checks},
              {"first_checks", path.first_checks},
              {"margin_m", path.margin_m},
-             {"planned_length", guide::path_length(path.planned)},
+             {"planned_length", search::path_length(path.planned)},
              {"planned_points", path.planned.cols()},
              {"roots", path.roots},
              {"states", path.states}}},
@@ -91,7 +91,7 @@ PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& w
   GuideQuery query(arm, world, view);
   query.set_poll(poll);
   const Json params = scene.planner ? scene.planner->params : Json::object();
-  const guide::Guide guide(arm, guide_settings(scene, arm, view, reserve_of(scene), params));
+  const search::Guide guide(arm, guide_settings(scene, arm, view, reserve_of(scene), params));
   PathPlan plan;
   plan.scene = scene.name;
   plan.robot = arm.robot().name;

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "hamelin/core/numbers.hpp"
-#include "shield/levers.hpp"
+#include "hamelin/scene/levers.hpp"
 
 namespace hamelin::control {
 
@@ -30,7 +30,7 @@ Certificate::Certificate(const model::Model& model, double limit, const scene::S
       limit_(limit),
       self_(self),
       self_limit_(self_limit),
-      levers_(std::make_unique<Levers>(model, self)),
+      levers_(std::make_unique<scene::Levers>(model, self)),
       arm_(model) {
   appearing_.reserve(obstacles_max);
   movers_.reserve(obstacles_max);

@@ -101,7 +101,8 @@ class TwoEnded {
 
 }  // namespace
 
-LineCheck::LineCheck(const model::Model& model, const Levers& levers, const scene::SelfField* self)
+LineCheck::LineCheck(const model::Model& model, const scene::Levers& levers,
+                     const scene::SelfField* self)
     : model_(model),
       levers_(levers),
       self_(self),

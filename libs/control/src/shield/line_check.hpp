@@ -6,9 +6,9 @@
 
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/environment.hpp"
+#include "hamelin/scene/levers.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/scene/shapes.hpp"
-#include "shield/levers.hpp"
 
 namespace hamelin::control {
 
@@ -29,7 +29,7 @@ class LineCheck {
 
   /// @param levers of the model, kept by reference
   /// @param self null if self-collision is not modelled
-  LineCheck(const model::Model& model, const Levers& levers, const scene::SelfField* self);
+  LineCheck(const model::Model& model, const scene::Levers& levers, const scene::SelfField* self);
 
   /// One end of a line.
   struct End {
@@ -105,7 +105,7 @@ class LineCheck {
                                      double limit, std::int32_t& hint);
 
   const model::Model& model_;
-  const Levers& levers_;
+  const scene::Levers& levers_;
   const scene::SelfField* self_;
   std::vector<Anchor> anchors_;
   std::vector<Begun> begun_, pairs_begun_;  ///< of shapes, and of pairs

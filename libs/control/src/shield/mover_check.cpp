@@ -18,7 +18,7 @@ constexpr double retreat_step_s = 0.0125, retreat_rounding_m = 1e-9;
 
 }  // namespace
 
-MoverCheck::MoverCheck(const model::Model& model, const Levers& levers)
+MoverCheck::MoverCheck(const model::Model& model, const scene::Levers& levers)
     : model_(model),
       levers_(levers),
       lever_(VectorXd::Zero(model.dof())),

@@ -8,9 +8,9 @@
 
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/environment.hpp"
+#include "hamelin/scene/levers.hpp"
 #include "hamelin/scene/shapes.hpp"
 #include "shield/fail_safe.hpp"
-#include "shield/levers.hpp"
 
 namespace hamelin::control {
 
@@ -25,7 +25,7 @@ class MoverCheck {
   static constexpr double horizon_s = 1.0;
 
   /// @param levers of the model, kept by reference
-  MoverCheck(const model::Model& model, const Levers& levers);
+  MoverCheck(const model::Model& model, const scene::Levers& levers);
 
   /// The world as a check sees it.
   struct World {
@@ -98,7 +98,7 @@ class MoverCheck {
                  const World& world, const FailSafe& motion, double from_s, double margin_m);
 
   const model::Model& model_;
-  const Levers& levers_;
+  const scene::Levers& levers_;
   Eigen::VectorXd lever_, dq_;              ///< lever_: the largest of any shape, per joint
   std::array<double, movers_max> balls_{};  ///< bounding radii of the obstacles [m]
   std::vector<int> movers_;                 ///< of the last check

@@ -16,6 +16,7 @@
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/environment.hpp"
+#include "hamelin/scene/levers.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/scene/shapes.hpp"
@@ -23,7 +24,6 @@
 #include "loop/stop_finder.hpp"
 #include "shield/asides.hpp"
 #include "shield/fail_safe.hpp"
-#include "shield/levers.hpp"
 #include "shield/line_check.hpp"
 #include "shield/move_time.hpp"
 #include "shield/mover_check.hpp"
@@ -175,7 +175,7 @@ class Shield {
   double torque_share_;
   Eigen::VectorXd speed_max_;  ///< of size zero: not modelled
   LimitReserve reserve_;
-  Levers levers_;
+  scene::Levers levers_;
   StopFinder finder_;
   Straying straying_;  ///< of tried_
   Stop stop_;

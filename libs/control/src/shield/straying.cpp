@@ -64,8 +64,9 @@ void Straying::Bounds::include(const Bounds& others) {
   shapes = shapes.cwiseMax(others.shapes);
 }
 
-Straying::Straying(const scene::Scene& scene, const model::Model& model, const Levers& levers,
-                   double period_s, double feedback_rate, double torque_rate)
+Straying::Straying(const scene::Scene& scene, const model::Model& model,
+                   const scene::Levers& levers, double period_s, double feedback_rate,
+                   double torque_rate)
     : model_(model),
       levers_(levers),
       period_s_(period_s),

@@ -5,9 +5,9 @@
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/model/model.hpp"
+#include "hamelin/scene/levers.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "shield/fail_safe.hpp"
-#include "shield/levers.hpp"
 #include "shield/stop_motion.hpp"
 
 namespace hamelin::control {
@@ -24,7 +24,7 @@ class Straying {
   /// @param period_s time between two steps
   /// @param feedback_rate ω of a stop's feedback, docs/theory.md (14.14) [1/s]
   /// @param torque_rate largest rate of change of each torque [Nm/s or N/s]; zero: unbounded
-  Straying(const scene::Scene& scene, const model::Model& model, const Levers& levers,
+  Straying(const scene::Scene& scene, const model::Model& model, const scene::Levers& levers,
            double period_s, double feedback_rate, double torque_rate);
 
   /// By how much the arm may stray from a motion.
@@ -78,7 +78,7 @@ class Straying {
   void include_shapes(const Eigen::VectorXd& q, double compliance_s2);
 
   const model::Model& model_;
-  const Levers& levers_;
+  const scene::Levers& levers_;
   double period_s_;
   bool limits_rate_;          ///< whether torques change at a bounded rate
   double mass_error_;         ///< bound of unexplained torques as a share of the model's own

@@ -10,9 +10,11 @@
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/scene/shapes.hpp"
 
-namespace hamelin::control {
-
+namespace hamelin::scene {
 class Levers;
+}
+
+namespace hamelin::control {
 
 /// Proves that the motion between two nodes stays clear: chapter 12 of docs/theory.md. The motion
 /// is assumed to follow the joint-space line q + s Δq, from which joint j deviates by at most σ_j,
@@ -110,7 +112,7 @@ class Certificate {
   double limit_;
   const scene::SelfField* self_;
   double self_limit_;
-  std::unique_ptr<Levers> levers_;
+  std::unique_ptr<scene::Levers> levers_;
 
   // of the step that is checked
   Eigen::VectorXd q_, dq_, stray_;  ///< stray: σ

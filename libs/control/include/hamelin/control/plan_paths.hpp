@@ -5,16 +5,16 @@
 #include <vector>
 
 #include "hamelin/control/world.hpp"
-#include "hamelin/guide/guide.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/scene/scene.hpp"
+#include "hamelin/search/search.hpp"
 
 namespace hamelin::control {
 
 /// The path to one goal of a scene, with its certificate.
 struct PlannedGoal {
   std::string type;  ///< of the goal, as in a scene file
-  guide::Path path;
+  search::Path path;
   /// For each straight line of the path, the smallest distance of the arm from obstacles and from
   /// itself that is proved, but for 0.1 mm [m]; at most 0.2 m.
   std::vector<double> clearance_m;

@@ -29,7 +29,7 @@
 #include "hamelin/core/rng.hpp"
 #include "search.hpp"
 
-namespace hamelin::guide {
+namespace hamelin::search {
 
 namespace ob = ompl::base;
 namespace og = ompl::geometric;
@@ -352,4 +352,4 @@ Found search(const Search& search) {
   }
 }
 
-}  // namespace hamelin::guide
+}  // namespace hamelin::search

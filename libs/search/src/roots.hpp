@@ -4,9 +4,9 @@
 
 #include "hamelin/core/rng.hpp"
 #include "hamelin/dynamics/joint_box.hpp"
-#include "hamelin/guide/guide.hpp"
+#include "hamelin/search/search.hpp"
 
-namespace hamelin::guide {
+namespace hamelin::search {
 
 /// A configuration at which a goal is reached, with its clearance [m].
 struct Root {
@@ -20,4 +20,4 @@ struct Root {
                                            const Settings& settings, const Problem& problem,
                                            Query& query, Rng& rng);
 
-}  // namespace hamelin::guide
+}  // namespace hamelin::search

@@ -7,11 +7,11 @@
 
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/environment.hpp"
+#include "hamelin/scene/levers.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/scene/shapes.hpp"
-#include "shield/levers.hpp"
 
-namespace hamelin::control {
+namespace hamelin::search {
 
 /// Proves that the arm keeps a margin on straight joint motions, which may be long and have nothing
 /// to do with each other, as the edges of a search: docs/theory.md (17.2)–(17.4). A motion is
@@ -61,7 +61,7 @@ class EdgeCheck {
 
   const model::Model& model_;
   const scene::SelfField* self_;
-  Levers levers_;
+  scene::Levers levers_;
   const scene::Environment* environment_ = nullptr;
   double time_s_ = 0.0, margin_ = 0.0;
   bool obstacles_ = false, movers_ = false;
@@ -74,4 +74,4 @@ class EdgeCheck {
   long checks_ = 0;
 };
 
-}  // namespace hamelin::control
+}  // namespace hamelin::search

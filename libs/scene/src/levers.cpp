@@ -1,16 +1,16 @@
-#include "shield/levers.hpp"
+#include "hamelin/scene/levers.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "hamelin/dynamics/dynamics.hpp"
 
-namespace hamelin::control {
+namespace hamelin::scene {
 
 using Eigen::Index;
 using Eigen::VectorXd;
 
-Levers::Levers(const model::Model& model, const scene::SelfField* self)
+Levers::Levers(const model::Model& model, const SelfField* self)
     : model_(model),
       self_(self),
       frame_distance_(VectorXd::Zero(model.dof())),
@@ -71,4 +71,4 @@ void Levers::curvature(const VectorXd& dq, VectorXd& c) const {
   }
 }
 
-}  // namespace hamelin::control
+}  // namespace hamelin::scene

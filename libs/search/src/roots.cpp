@@ -5,7 +5,7 @@
 
 #include "hamelin/dynamics/inverse_kinematics.hpp"
 
-namespace hamelin::guide {
+namespace hamelin::search {
 
 using Eigen::Index;
 using Eigen::Vector3d;
@@ -96,4 +96,4 @@ std::vector<Root> find_roots(const model::Model& model, const dynamics::JointBox
   return roots;
 }
 
-}  // namespace hamelin::guide
+}  // namespace hamelin::search

@@ -4,7 +4,7 @@
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/self_collision.hpp"
 
-namespace hamelin::control {
+namespace hamelin::scene {
 
 /// Upper bounds of how far a joint moves a shape of the arm, whatever the configuration:
 /// docs/theory.md (12.3), and (12.11) for pairs of parts, in the frame of the part nearer to the
@@ -13,7 +13,7 @@ namespace hamelin::control {
 class Levers {
  public:
   /// @param self null if self-collision is not modelled
-  Levers(const model::Model& model, const scene::SelfField* self);
+  Levers(const model::Model& model, const SelfField* self);
 
   /// shapes × dof [m/rad, or 1 for prismatic joints].
   [[nodiscard]] const Eigen::MatrixXd& shapes() const noexcept { return shapes_; }
@@ -38,10 +38,10 @@ class Levers {
   void set();
 
   const model::Model& model_;
-  const scene::SelfField* self_;
+  const SelfField* self_;
   Eigen::VectorXd frame_distance_;  ///< of successive joint frames at q = 0 [m]
   Eigen::VectorXd travel_;          ///< largest |q| of prismatic joints [m]
   Eigen::MatrixXd shapes_, pairs_;
 };
 
-}  // namespace hamelin::control
+}  // namespace hamelin::scene

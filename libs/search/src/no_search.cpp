@@ -1,7 +1,7 @@
 #include "hamelin/core/error.hpp"
 #include "search.hpp"
 
-namespace hamelin::guide {
+namespace hamelin::search {
 
 bool available() noexcept {
   return false;
@@ -11,4 +11,4 @@ Found search(const Search&) {
   throw Error(ErrorCode::invalid, std::string(why_unavailable()));
 }
 
-}  // namespace hamelin::guide
+}  // namespace hamelin::search

@@ -1,4 +1,4 @@
-#include "hamelin/guide/guide.hpp"
+#include "hamelin/search/search.hpp"
 
 #include <fmt/format.h>
 
@@ -13,7 +13,7 @@
 #include "search.hpp"
 #include "shorten.hpp"
 
-namespace hamelin::guide {
+namespace hamelin::search {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -172,8 +172,8 @@ Path Guide::search(const Problem& problem, Query& query) const {
     const auto end = static_cast<long>(used * static_cast<double>(settings_.checks_max));
     Found found = straight(problem.start, goals.front(), edges);
     if (found.points.cols() == 0)
-      found = guide::search({settings_.type, bounds, problem.start, goals, edges, rng.next(),
-                             before + end, settings_.improve_checks});
+      found = search::search({settings_.type, bounds, problem.start, goals, edges, rng.next(),
+                              before + end, settings_.improve_checks});
     out.states += found.states;
     if (found.points.cols() == 0) continue;
     out.first_checks = found.first_checks - before;
@@ -186,4 +186,4 @@ Path Guide::search(const Problem& problem, Query& query) const {
   return ended(fmt::format("no path was found within {} checks", settings_.checks_max));
 }
 
-}  // namespace hamelin::guide
+}  // namespace hamelin::search

@@ -4,13 +4,13 @@
 #include <limits>
 #include <vector>
 
-#include "hamelin/guide/guide.hpp"
+#include "hamelin/search/search.hpp"
 
 namespace hamelin::test {
 
 /// A world that is given in joint space: balls that a configuration must not enter. Distances of
 /// points and lines from them have a closed form, so that motions are proved exactly.
-class JointSpaceWorld final : public guide::Query {
+class JointSpaceWorld final : public search::Query {
  public:
   struct Ball {
     Eigen::VectorXd center;

@@ -1,10 +1,10 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "hamelin/guide/guide.hpp"
-#include "hamelin/guide/margins.hpp"
+#include "hamelin/search/margins.hpp"
+#include "hamelin/search/search.hpp"
 
-namespace hamelin::guide {
+namespace hamelin::search {
 
 /// Configurations and straight motions that keep the margins of a search.
 class Edges {
@@ -24,4 +24,4 @@ class Edges {
   Margins margins_;
 };
 
-}  // namespace hamelin::guide
+}  // namespace hamelin::search

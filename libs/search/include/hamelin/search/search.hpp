@@ -8,7 +8,7 @@
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/scene.hpp"
 
-namespace hamelin::guide {
+namespace hamelin::search {
 
 /// What a search asks of the world. Used by one thread. Configurations are dof numbers [rad or m].
 class Query {
@@ -98,4 +98,4 @@ class Guide {
   Settings settings_;
 };
 
-}  // namespace hamelin::guide
+}  // namespace hamelin::search

@@ -1,4 +1,4 @@
-#include "hamelin/guide/guide.hpp"
+#include "hamelin/search/search.hpp"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
@@ -8,8 +8,8 @@
 
 #include "hamelin/core/rng.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
-#include "hamelin/guide/margins.hpp"
 #include "hamelin/model/make_chain.hpp"
+#include "hamelin/search/margins.hpp"
 #include "hamelin/test/errors.hpp"
 #include "hamelin/test/guides.hpp"
 #include "joint_space_world.hpp"
@@ -39,8 +39,8 @@ struct GuideRig {
   static std::vector<test::JointSpaceWorld::Ball> ball() { return {{VectorXd::Zero(3), 0.8}}; }
 
   model::Model arm;
-  guide::Settings settings;
-  guide::Problem problem;
+  search::Settings settings;
+  search::Problem problem;
 };
 
 // The smallest distance from the balls at many places of a path, without the query's own proof.
@@ -68,7 +68,7 @@ TEST_CASE("each guide finds a path around an obstacle, which keeps the margin", 
     GuideRig rig;
     rig.settings.type = type;
     test::JointSpaceWorld world(GuideRig::ball());
-    const guide::Path path = guide::Guide(rig.arm, rig.settings).search(rig.problem, world);
+    const search::Path path = search::Guide(rig.arm, rig.settings).search(rig.problem, world);
     REQUIRE(path.found());
     CHECK(path.cause.empty());
     CHECK(path.points.col(0) == rig.problem.start);
@@ -80,7 +80,7 @@ TEST_CASE("each guide finds a path around an obstacle, which keeps the margin", 
     CHECK(path.first_checks > 0);
     CHECK(path.first_checks <= path.checks);
     CHECK(path.roots == 1);
-    CHECK(path.length <= guide::path_length(path.planned) + 1e-12);
+    CHECK(path.length <= search::path_length(path.planned) + 1e-12);
     // The shortest way has two tangents of the ball with the margin, and an arc between them.
     const double half = std::sqrt(3.0), radius = 0.85;
     const double shortest = 2.0 * std::sqrt(half * half - radius * radius) +
@@ -100,18 +100,18 @@ TEST_CASE("a search depends on seed, number and problem alone", "[guide][threads
       own.settings.seed = seed;
       own.problem.number = number;
       test::JointSpaceWorld world(GuideRig::ball());
-      return guide::Guide(own.arm, own.settings).search(own.problem, world);
+      return search::Guide(own.arm, own.settings).search(own.problem, world);
     };
-    const guide::Path first = search(7, 2);
+    const search::Path first = search(7, 2);
     (void)search(8, 2);
     (void)search(7, 3);
-    const guide::Path again = search(7, 2);
+    const search::Path again = search(7, 2);
     CHECK(same(again.points, first.points));
     CHECK(same(again.planned, first.planned));
     CHECK(again.checks == first.checks);
     CHECK_FALSE(same(search(8, 2).planned, first.planned));
     CHECK_FALSE(same(search(7, 3).planned, first.planned));
-    std::vector<guide::Path> paths(3);
+    std::vector<search::Path> paths(3);
     std::vector<std::thread> threads;
     for (auto& path : paths) threads.emplace_back([&] { path = search(7, 2); });
     for (auto& thread : threads) thread.join();
@@ -128,11 +128,11 @@ TEST_CASE("a path to a goal of the tip ends within its tolerances", "[guide]") {
     const VectorXd reached = VectorXd::NullaryExpr(7, [&] { return rng.uniform(-1.0, 1.0); });
     dynamics::forward_kinematics(arm, ws, reached);
     const geometry::SE3 tip = dynamics::tip_pose(arm, ws);
-    guide::Problem problem;
+    search::Problem problem;
     problem.start = VectorXd::Zero(7);
     problem.goal = turns ? scene::pose_goal(tip) : scene::position_goal(tip.p());
     test::JointSpaceWorld world({{VectorXd::Constant(7, 0.3), 0.1}});
-    const guide::Path path = guide::Guide(arm, {}).search(problem, world);
+    const search::Path path = search::Guide(arm, {}).search(problem, world);
     REQUIRE(path.found());
     CHECK(path.roots > 1);
     dynamics::forward_kinematics(arm, ws, VectorXd(path.points.rightCols(1)));
@@ -149,7 +149,7 @@ TEST_CASE("a search says why it found no path, and keeps to its checks", "[guide
   rig.settings.checks_max = 2000;
   const auto search = [&](const VectorXd& center, double radius) {
     test::JointSpaceWorld world({{center, radius}});
-    return guide::Guide(rig.arm, rig.settings).search(rig.problem, world);
+    return search::Guide(rig.arm, rig.settings).search(rig.problem, world);
   };
   CHECK(search(rig.problem.start, 0.1).cause == "the arm is in contact where it is");
   CHECK(search(rig.problem.goal.q, 0.2).cause == "no clear configuration was found at the goal");
@@ -160,7 +160,7 @@ TEST_CASE("a search says why it found no path, and keeps to its checks", "[guide
   for (const auto type : all_guides) {
     CAPTURE(to_string(type));
     rig.settings.type = type;
-    const guide::Path path = guide::Guide(rig.arm, rig.settings).search(rig.problem, wall);
+    const search::Path path = search::Guide(rig.arm, rig.settings).search(rig.problem, wall);
     CHECK_FALSE(path.found());
     CHECK(path.points.cols() == 0);
     CHECK(path.cause == "no path was found within 2000 checks");
@@ -173,7 +173,7 @@ TEST_CASE("a goal that is not clear is replaced by a clear place within its tole
   GuideRig rig;
   rig.problem.goal.tolerance_rad = 0.2;
   test::JointSpaceWorld world({{rig.problem.goal.q, 0.05}});
-  const guide::Path path = guide::Guide(rig.arm, rig.settings).search(rig.problem, world);
+  const search::Path path = search::Guide(rig.arm, rig.settings).search(rig.problem, world);
   REQUIRE(path.found());
   const VectorXd end = path.points.rightCols(1);
   CHECK(world.distance(end, end) > 0.0);
@@ -187,20 +187,20 @@ TEST_CASE("tight starts and goals are reached with the clearance that they have"
   test::JointSpaceWorld world({{rig.problem.start + 0.31 * beside, 0.3},
                                {rig.problem.start - 0.31 * beside, 0.3},
                                {rig.problem.goal.q + 0.32 * beside, 0.3}});
-  const guide::Path path = guide::Guide(rig.arm, rig.settings).search(rig.problem, world);
+  const search::Path path = search::Guide(rig.arm, rig.settings).search(rig.problem, world);
   REQUIRE(path.found());
   CHECK(sampled_distance(world, path.points) > 0.009);
 }
 
 // A guide of a temporary model must not compile.
-static_assert(std::is_constructible_v<guide::Guide, const model::Model&, guide::Settings> &&
-              !std::is_constructible_v<guide::Guide, model::Model, guide::Settings>);
+static_assert(std::is_constructible_v<search::Guide, const model::Model&, search::Settings> &&
+              !std::is_constructible_v<search::Guide, model::Model, search::Settings>);
 
 TEST_CASE("bad settings and problems are refused in one line", "[guide]") {
-  if (!guide::available()) {
+  if (!search::available()) {
     CHECK(test::error_of([] {
             const model::Model arm(model::make_chain({3}));
-            guide::Guide(arm, {});
+            search::Guide(arm, {});
           }).find("install libompl-dev") != std::string::npos);
     return;
   }
@@ -208,7 +208,7 @@ TEST_CASE("bad settings and problems are refused in one line", "[guide]") {
   test::JointSpaceWorld world({});
   const auto error = [&] {
     return test::error_of(
-        [&] { (void)guide::Guide(rig.arm, rig.settings).search(rig.problem, world); });
+        [&] { (void)search::Guide(rig.arm, rig.settings).search(rig.problem, world); });
   };
   rig.problem.start = VectorXd::Zero(2);
   CHECK(error() ==
@@ -235,7 +235,7 @@ TEST_CASE("the least margin on a line is that of its configurations", "[guide]")
     return VectorXd(VectorXd::NullaryExpr(4, [&] { return rng.uniform(-1.0, 1.0); }));
   };
   for (int i = 0; i < 200; ++i) {
-    guide::Margins margins(0.02);
+    search::Margins margins(0.02);
     margins.add(draw(), 0.005, 0.2, 0.9);
     margins.add(draw(), 0.001, 0.02, 0.3);
     margins.add(draw(), 0.05, 0.2, 0.9);  // has no effect

@@ -6,7 +6,7 @@
 #include "edges.hpp"
 #include "hamelin/dynamics/joint_box.hpp"
 
-namespace hamelin::guide {
+namespace hamelin::search {
 
 /// A search of one of OMPL's planners.
 struct Search {
@@ -29,4 +29,4 @@ struct Found {
 /// @throws Error invalid if the build has no OMPL, or OMPL reports an error
 [[nodiscard]] Found search(const Search& search);
 
-}  // namespace hamelin::guide
+}  // namespace hamelin::search

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-namespace hamelin::guide {
+namespace hamelin::search {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -82,4 +82,4 @@ MatrixXd shorten(const MatrixXd& points, Edges& edges, Rng& rng) {
   return skip_points(path, edges);
 }
 
-}  // namespace hamelin::guide
+}  // namespace hamelin::search

@@ -1,9 +1,9 @@
-#include "guide/edge_check.hpp"
+#include "hamelin/search/edge_check.hpp"
 
 #include <algorithm>
 #include <numeric>
 
-namespace hamelin::control {
+namespace hamelin::search {
 
 using Eigen::Index;
 using Eigen::VectorXd;
@@ -140,4 +140,4 @@ bool EdgeCheck::prove(const Piece& piece, std::span<const int> subjects, int dep
          prove({piece.at, half, piece.from, middle}, level.open, depth + 1);
 }
 
-}  // namespace hamelin::control
+}  // namespace hamelin::search

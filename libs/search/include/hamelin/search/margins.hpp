@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-namespace hamelin::guide {
+namespace hamelin::search {
 
 /// The clearance that a path must keep: a full margin, and less near places where the arm must be
 /// although they have less, which are the start and the goals. docs/theory.md (17.1)
@@ -33,4 +33,4 @@ class Margins {
   std::vector<Place> places_;
 };
 
-}  // namespace hamelin::guide
+}  // namespace hamelin::search
