@@ -182,7 +182,6 @@ class Drawer {
 }  // namespace
 
 ProblemSet draw_problem_set(const DrawOptions& options) {
-  if (!search::available()) throw Error(ErrorCode::invalid, std::string(search::why_unavailable()));
   ProblemSet set;
   set.name = options.name;
   set.robot = options.robot;

@@ -94,11 +94,11 @@ MatrixXd guide_path(const scene::Scene& scene, const model::Model& arm) {
   control::World world(scene, arm, {});
   const control::WorldView view(scene, arm, world);
   control::GuideQuery query(arm, world, view);
-  const search::Guide guide(
+  search::Search search(
       arm, control::guide_settings(scene, arm, view, {},
                                    scene.planner ? scene.planner->params : Json::object()));
   query.refresh(0.0);
-  const search::Path path = guide.search({scene.start_q, scene.goals.front(), 1}, query);
+  const search::Path path = search.search({scene.start_q, {scene.goals.front()}, 1}, query);
   if (!path.found())
     throw Error(ErrorCode::invalid, scene.name + ": /goals/0: no path found: " + path.cause);
   return path.points;

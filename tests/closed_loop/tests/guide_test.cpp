@@ -7,7 +7,6 @@
 #include "hamelin/search/search.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/test/errors.hpp"
-#include "hamelin/test/guides.hpp"
 #include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
@@ -48,7 +47,6 @@ const std::string connect = "/planner/guide=rrt-connect";
 
 TEST_CASE("a guided planner without an escape reaches all goals, clear and certified",
           "[closed_loop][guide]") {
-  test::require_guides();
   const auto guide = GENERATE(as<std::string>{}, "rrt", "rrt-connect", "rrt-star", "bit-star",
                               "informed-rrt-star");
   CAPTURE(guide);
@@ -66,7 +64,6 @@ TEST_CASE("a guided planner without an escape reaches all goals, clear and certi
 }
 
 TEST_CASE("guided runs repeat themselves to the byte", "[closed_loop][guide]") {
-  test::require_guides();
   const std::vector<Json> first = logged_ticks({connect}), again = logged_ticks({connect});
   REQUIRE(first.size() > 100);
   CHECK(first == again);
@@ -74,7 +71,6 @@ TEST_CASE("guided runs repeat themselves to the byte", "[closed_loop][guide]") {
 }
 
 TEST_CASE("the charge of a search delays its path", "[closed_loop][guide]") {
-  test::require_guides();
   const std::string one_goal =
       R"(/goals=[{"type": "joint", "q": [0.3, -0.4, 0, -1.5, 0, 1.4, 0]}])";
   for (const double check_s : {0.0, 1e-4, 1e-3}) {
@@ -92,7 +88,6 @@ TEST_CASE("the charge of a search delays its path", "[closed_loop][guide]") {
 }
 
 TEST_CASE("a guided run whose map changes in its way searches again", "[closed_loop][guide]") {
-  test::require_guides();
   const scene::Scene scene = shelf({connect});
   const control::PathPlan plan = control::plan_paths(scene);
   REQUIRE(plan.found());
@@ -108,7 +103,6 @@ TEST_CASE("a guided run whose map changes in its way searches again", "[closed_l
 
 TEST_CASE("plans have a certificate for each line and chain from goal to goal",
           "[closed_loop][guide]") {
-  test::require_guides();
   const control::PathPlan plan = control::plan_paths(shelf({connect}));
   const Json document = control::to_json(plan);
   check_shipped_schema(document, "path", "plan");
@@ -123,13 +117,4 @@ TEST_CASE("plans have a certificate for each line and chain from goal to goal",
   CHECK(test::error_of([] { (void)control::plan_paths(shelf({})); })
             .ends_with("shelf.json: /planner/guide: is none, expected a guide such as "
                        "rrt-connect"));
-}
-
-TEST_CASE("a scene that asks for a guide says in one line that the build has none",
-          "[closed_loop][guide]") {
-  test::skip_unless(!search::available(), "this build has OMPL");
-  CHECK(test::error_of([] { (void)run({connect}); })
-            .ends_with("shelf.json: /planner/guide: is rrt-connect, which this build of hamelin is "
-                       "without, expected none; to build with OMPL, install libompl-dev and "
-                       "configure again"));
 }

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "../c_loop.hpp"
-#include "hamelin/test/guides.hpp"
 #include "shield/shield.hpp"
 
 using namespace hamelin;
@@ -133,7 +132,6 @@ TEST_CASE("in C, a controller without a shield and a guide says so", "[control][
 }
 
 TEST_CASE("in C, a guide without a thread searches when it is told to", "[control][c]") {
-  test::require_guides();
   Json document = c_document("hybrid", {{"escape", "none"}});
   document["planner"]["guide"] = "rrt-connect";
   CLoop loop(document, [](hamelin_controller_options& options) { options.no_guide_thread = 1; });

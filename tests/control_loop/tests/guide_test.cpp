@@ -7,7 +7,6 @@
 #include "guide/guide_search.hpp"
 #include "hamelin/search/search.hpp"
 #include "hamelin/test/allocations.hpp"
-#include "hamelin/test/guides.hpp"
 
 using namespace hamelin;
 using Eigen::VectorXd;
@@ -28,7 +27,6 @@ const Json no_escape{{"escape", "none"}};
 
 TEST_CASE("a controller follows paths that its guide's thread finds, without allocating in ticks",
           "[control][guide][threads]") {
-  test::require_guides();
   Loop loop(guided_scene(), {}, no_escape);
   control::ControlState state = control::ControlState::running;
   long allocations = 0;
@@ -50,7 +48,6 @@ TEST_CASE("a controller follows paths that its guide's thread finds, without all
 
 TEST_CASE("without a thread the guide searches when it is told to, and the arm waits until then",
           "[control][guide]") {
-  test::require_guides();
   control::Controller::Options options;
   options.guide_thread = false;
   Loop loop(guided_scene(), options, no_escape);
@@ -67,7 +64,6 @@ TEST_CASE("without a thread the guide searches when it is told to, and the arm w
 
 TEST_CASE("a path that stays clear is kept where the world changes, and searched again where not",
           "[control][guide]") {
-  test::require_guides();
   control::Controller::Options options;
   options.guide_thread = false;
   Loop loop(guided_scene(), options, no_escape);
@@ -105,7 +101,6 @@ TEST_CASE("a path that stays clear is kept where the world changes, and searched
 
 TEST_CASE("new goals, a new start and a load begin with a search of their own",
           "[control][guide]") {
-  test::require_guides();
   control::Controller::Options options;
   options.guide_thread = false;
   options.payload_reach_m = 0.3;
@@ -139,7 +134,6 @@ TEST_CASE("planners that follow no paths are shown their way-points", "[control]
   const scene::GuideSpec spec{scene::GuideType::rrt_connect, {}, 1000, 0, 1, 0.0};
   CHECK(planning::find_plugin("hybrid", {HAMELIN_TEST_PLUGIN_DIR}).follows_paths());
   CHECK_FALSE(planning::find_plugin("apf", {HAMELIN_TEST_PLUGIN_DIR}).follows_paths());
-  test::require_guides();
   scene::Scene scene = guided_scene();
   scene.planner->name = "apf";
   control::Controller::Options options;

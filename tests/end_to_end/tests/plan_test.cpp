@@ -2,7 +2,6 @@
 
 #include "../program.hpp"
 #include "hamelin/search/search.hpp"
-#include "hamelin/test/guides.hpp"
 
 using namespace hamelin;
 using test::Sandbox;
@@ -21,7 +20,6 @@ std::vector<std::string> plan_with(std::vector<std::string> command,
 }  // namespace
 
 TEST_CASE("plan writes a path per goal, which a scene can use", "[plan]") {
-  test::require_guides();
   Sandbox sandbox;
   const auto text = sandbox.run(plan_with(plan_shelf, {"-o", "path.json"}));
   CHECK(text.exit_code == 0);
@@ -50,7 +48,6 @@ TEST_CASE("plan writes a path per goal, which a scene can use", "[plan]") {
 }
 
 TEST_CASE("a guided run is replayed to the byte", "[plan]") {
-  test::require_guides();
   Sandbox sandbox;
   const auto run = sandbox.run({"run", "data/scenes/shelf.json", "--guide", "informed-rrt-star",
                                 "--log", "run.jsonl.zst", "--every", "100"});
@@ -59,7 +56,6 @@ TEST_CASE("a guided run is replayed to the byte", "[plan]") {
 }
 
 TEST_CASE("plan has exit code 1 where there is no path", "[plan]") {
-  test::require_guides();
   Sandbox sandbox;
   const std::string unreachable = R"(/goals=[{"type": "position", "position_m": [5.0, 0.0, 0.5]}])";
   const Json plan = test::run_json(sandbox, plan_with(plan_shelf, {"--set", unreachable}), 1);
@@ -98,9 +94,4 @@ TEST_CASE("bad input of plan and of paths ends in one line", "[plan]") {
              Catch::Contains("path.json: /paths/3: has no way-points, expected a path that was "
                              "found"));
   CHECK_THAT(error(path_goal("path.json", 0)), Catch::Contains("2 values given, expected 7"));
-  if (search::available()) return;
-  CHECK(error(plan_shelf) ==
-        "hamelin: data/scenes/shelf.json: /planner/guide: is rrt-connect, which this build of "
-        "hamelin is without, expected none; to build with OMPL, install libompl-dev and configure "
-        "again\n");
 }

@@ -1,10 +1,7 @@
 #include "guide/guide_query.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
-#include "hamelin/core/error.hpp"
 
 namespace hamelin::control {
 
@@ -42,6 +39,18 @@ double GuideQuery::clearance(const VectorXd& q, double at_least_m) {
   return query_.clearance(q.data(), time_s_, at_least_m);
 }
 
+// Near tight places, where the margins vary, a motion is divided into pieces with a margin each.
+bool GuideQuery::motion_clear(const VectorXd& a, const VectorXd& b) {
+  constexpr double piece = 0.1, constant_m = 5e-4;
+  poll();
+  const double least = margins_.least(a, b);
+  const bool constant = std::max(margins_.required(a), margins_.required(b)) - least < constant_m;
+  if (constant || (b - a).norm() <= piece) return edges_.motion_clear(a, b, least);
+  // The half at b first: it is new to the caller, and likelier to be in collision.
+  const VectorXd middle = 0.5 * (a + b);
+  return motion_clear(middle, b) && motion_clear(a, middle);
+}
+
 double GuideQuery::proved_clearance(const VectorXd& a, const VectorXd& b) {
   const long before = edges_.checks();
   double low = 0.0, high = std::min({influence_, query_.clearance(a.data(), time_s_, -1.0),
@@ -61,14 +70,7 @@ double GuideQuery::proved_clearance(const VectorXd& a, const VectorXd& b) {
 search::Settings guide_settings(const scene::Scene& scene, const model::Model& nominal,
                                 const WorldView& view, const LimitReserve& reserve,
                                 const Json& params) {
-  if (!search::available())
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: /planner/guide: is {}, which this build of hamelin is without, "
-                            "expected none; to build with OMPL, install libompl-dev and configure "
-                            "again",
-                            scene.name, scene::to_string(scene.guide.type)));
   search::Settings out;
-  out.type = scene.guide.type;
   const planning::SetupData setup = planner_setup(scene, nominal, view, scene.step_s, reserve);
   out.q_lower = setup.q_lower;
   out.q_upper = setup.q_upper;

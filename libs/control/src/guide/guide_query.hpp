@@ -25,15 +25,8 @@ class GuideQuery final : public search::Query {
   std::uint64_t refresh(double time_s);
 
   [[nodiscard]] double clearance(const Eigen::VectorXd& q, double at_least_m) override;
-  [[nodiscard]] bool posture_clear(const Eigen::VectorXd& q, double margin_m) override {
-    poll();
-    return edges_.posture_clear(q, margin_m);
-  }
-  [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
-                                  double margin_m) override {
-    poll();
-    return edges_.motion_clear(a, b, margin_m);
-  }
+  void set_margins(const search::Margins& margins) override { margins_ = margins; }
+  [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) override;
   [[nodiscard]] long checks() const override { return edges_.checks() + clearances_; }
 
   /// A function to be called now and then during searches. It may throw, which ends the search.
@@ -52,6 +45,7 @@ class GuideQuery final : public search::Query {
 
   WorldQuery query_;
   search::EdgeCheck edges_;
+  search::Margins margins_{0.0};
   double influence_, time_s_ = 0.0;
   long clearances_ = 0, calls_ = 0;
   std::function<void()> poll_;
@@ -61,7 +55,6 @@ class GuideQuery final : public search::Query {
 /// @param nominal the controller's model @param view of the world
 /// @param reserve what a shield keeps
 /// @param params of the planner: guides keep somewhat more than its margin_m
-/// @throws Error invalid if the build has no OMPL
 [[nodiscard]] search::Settings guide_settings(const scene::Scene& scene,
                                               const model::Model& nominal, const WorldView& view,
                                               const LimitReserve& reserve, const Json& params);

@@ -16,7 +16,7 @@ GuideRequest::GuideRequest(Index dof, Index points_max)
 
 GuideSearch::GuideSearch(const model::Model& model, const World& world, const WorldView& view,
                          search::Settings settings, Index points_max, bool threaded)
-    : guide_(model, std::move(settings)),
+    : search_(model, std::move(settings)),
       query_(model, world, view),
       request_(model.dof(), points_max),
       answers_(std::make_unique<GuideAnswer>()) {
@@ -52,8 +52,9 @@ void GuideSearch::work() {
 }
 
 bool GuideSearch::still_clear() {
+  query_.set_margins(search::Margins(0.0));
   for (Index i = 0; i + 1 < request_.kept_count; ++i)
-    if (!query_.motion_clear(request_.kept.col(i), request_.kept.col(i + 1), 0.0)) return false;
+    if (!query_.motion_clear(request_.kept.col(i), request_.kept.col(i + 1))) return false;
   return request_.kept_count > 0;
 }
 
@@ -64,7 +65,7 @@ void GuideSearch::answer() {
   out->snapshot = query_.refresh(request_.time_s);
   out->kept = still_clear();
   try {
-    if (!out->kept) out->path = guide_.search({request_.q, request_.goal, request_.search}, query_);
+    if (!out->kept) out->path = search_.search({request_.q, {request_.goal}, request_.search}, query_);
   } catch (const std::exception& e) {  // on a thread of its own nobody could catch it
     out->path.cause = e.what();
   }

@@ -63,7 +63,7 @@ class GuideSearch {
   void answer();
   [[nodiscard]] bool still_clear();
 
-  search::Guide guide_;
+  search::Search search_;
   GuideQuery query_;
   GuideRequest request_;
   Newest<GuideAnswer> answers_;

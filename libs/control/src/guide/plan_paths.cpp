@@ -91,7 +91,7 @@ PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& w
   GuideQuery query(arm, world, view);
   query.set_poll(poll);
   const Json params = scene.planner ? scene.planner->params : Json::object();
-  const search::Guide guide(arm, guide_settings(scene, arm, view, reserve_of(scene), params));
+  search::Search search(arm, guide_settings(scene, arm, view, reserve_of(scene), params));
   PathPlan plan;
   plan.scene = scene.name;
   plan.robot = arm.robot().name;
@@ -104,7 +104,7 @@ PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& w
     PlannedGoal planned;
     planned.type = scene::type_name(goal);
     const double since = process_cpu_s();
-    planned.path = guide.search({start, goal, plan.goals.size() + 1}, query);
+    planned.path = search.search({start, {goal}, plan.goals.size() + 1}, query);
     planned.search_s = process_cpu_s() - since;
     const Eigen::MatrixXd& points = planned.path.points;
     for (Index i = 0; i + 1 < points.cols(); ++i)

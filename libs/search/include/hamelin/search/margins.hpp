@@ -8,28 +8,35 @@ namespace hamelin::search {
 /// although they have less, which are the start and the goals. docs/theory.md (17.1)
 class Margins {
  public:
+  /// A place where less than the full margin is kept.
+  struct Place {
+    Eigen::VectorXd q;
+    double margin;     ///< kept there [m]
+    double near, far;  ///< distances at which it counts fully, and not at all
+  };
+
   /// @param full_m away from tight places
-  explicit Margins(double full_m) : full_(full_m) {}
+  /// @param weights of the joints in distances between configurations, docs/theory.md (17.0); of
+  ///        size zero: ones
+  explicit Margins(double full_m, Eigen::VectorXd weights = {})
+      : full_(full_m), weights_(std::move(weights)) {}
 
   void clear() noexcept { places_.clear(); }
-  /// A place at which `margin_m` is kept; one that is not less than the full margin has no effect.
-  /// @param near, far distance from the place at which its margin counts fully, and not at all [rad
-  ///        or m]
+  /// One whose margin is not less than the full margin has no effect.
   void add(const Eigen::VectorXd& q, double margin_m, double near, double far);
   [[nodiscard]] double full_m() const noexcept { return full_; }
+  [[nodiscard]] const Eigen::VectorXd& weights() const noexcept { return weights_; }
+  [[nodiscard]] const std::vector<Place>& places() const noexcept { return places_; }
   /// What a configuration must keep [m].
   [[nodiscard]] double required(const Eigen::VectorXd& q) const;
   /// The least that a configuration on the line between two others must keep.
   [[nodiscard]] double least(const Eigen::VectorXd& a, const Eigen::VectorXd& b) const;
 
  private:
-  struct Place {
-    Eigen::VectorXd q;
-    double margin, near, far;
-  };
   [[nodiscard]] double margin_at(const Place& place, double distance) const;
 
   double full_;
+  Eigen::VectorXd weights_;
   std::vector<Place> places_;
 };
 

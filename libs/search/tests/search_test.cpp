@@ -11,7 +11,6 @@
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/search/margins.hpp"
 #include "hamelin/test/errors.hpp"
-#include "hamelin/test/guides.hpp"
 #include "joint_space_world.hpp"
 
 using namespace hamelin;
@@ -62,7 +61,6 @@ bool same(const MatrixXd& a, const MatrixXd& b) {
 }  // namespace
 
 TEST_CASE("each guide finds a path around an obstacle, which keeps the margin", "[guide]") {
-  test::require_guides();
   for (const auto type : all_guides) {
     CAPTURE(to_string(type));
     GuideRig rig;
@@ -91,7 +89,6 @@ TEST_CASE("each guide finds a path around an obstacle, which keeps the margin", 
 }
 
 TEST_CASE("a search depends on seed, number and problem alone", "[guide][threads]") {
-  test::require_guides();
   for (const auto type : all_guides) {
     CAPTURE(to_string(type));
     const auto search = [&](std::uint64_t seed, std::uint64_t number) {
@@ -120,7 +117,6 @@ TEST_CASE("a search depends on seed, number and problem alone", "[guide][threads
 }
 
 TEST_CASE("a path to a goal of the tip ends within its tolerances", "[guide]") {
-  test::require_guides();
   const model::Model arm(model::make_chain({}));
   dynamics::Workspace ws(arm);
   Rng rng(5);
@@ -144,7 +140,6 @@ TEST_CASE("a path to a goal of the tip ends within its tolerances", "[guide]") {
 }
 
 TEST_CASE("a search says why it found no path, and keeps to its checks", "[guide]") {
-  test::require_guides();
   GuideRig rig;
   rig.settings.checks_max = 2000;
   const auto search = [&](const VectorXd& center, double radius) {
@@ -169,7 +164,6 @@ TEST_CASE("a search says why it found no path, and keeps to its checks", "[guide
 }
 
 TEST_CASE("a goal that is not clear is replaced by a clear place within its tolerance", "[guide]") {
-  test::require_guides();
   GuideRig rig;
   rig.problem.goal.tolerance_rad = 0.2;
   test::JointSpaceWorld world({{rig.problem.goal.q, 0.05}});
@@ -181,7 +175,6 @@ TEST_CASE("a goal that is not clear is replaced by a clear place within its tole
 }
 
 TEST_CASE("tight starts and goals are reached with the clearance that they have", "[guide]") {
-  test::require_guides();
   GuideRig rig;
   const VectorXd beside = VectorXd::Unit(3, 0);
   test::JointSpaceWorld world({{rig.problem.start + 0.31 * beside, 0.3},

@@ -1,0 +1,247 @@
+#include "run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "hamelin/search/joint_metric.hpp"
+
+namespace hamelin::search {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+// Distance from a goal and from the start at which its margin counts fully, and not at all. A path
+// soon leads away from a tight start: planners keep their margin there.
+constexpr double near_goal = 0.2, far_goal = 0.9, near_start = 0.02, far_start = 0.3;
+constexpr double start_slack_m = 2e-4;  // by which the clearance of the start may be undercut
+constexpr double limit_reserve = 1e-3;  // kept from joint limits [rad or m]
+constexpr double range = 0.5;           // the longest edge by which a tree grows
+// Share of the samples around the start or a root, where ways are often narrow, and their spread.
+constexpr double near_share = 0.3, near_spread = 0.5;
+constexpr double met = 1e-9;       // distance of configurations that count as one
+constexpr long root_checks = 200;  // after so many checks another root is looked for
+constexpr std::size_t nodes = 4096;
+/// The margins that a search keeps one after the other, as shares of the full one, and the share of
+/// its checks that all of them up to this one may use.
+struct Attempt {
+  double share, used;
+};
+constexpr std::array<Attempt, 3> attempts{{{1.0, 0.1}, {0.5, 0.3}, {0.1, 1.0}}};
+
+}  // namespace
+
+Search::Run::Run(const model::Model& model, const Settings& settings)
+    : settings_(settings),
+      weights_(joint_weights(model)),
+      box_(model.dof(), settings.q_lower, settings.q_upper, limit_reserve),
+      bounds_(box_),
+      finder_(model, box_, settings_),
+      shortening_(model.dof()),
+      from_start_(weights_, nodes),
+      from_goal_(weights_, nodes),
+      sample_(VectorXd::Zero(model.dof())),
+      at_(sample_) {}
+
+void Search::Run::begin(const Problem& problem, Query& query) {
+  problem_ = problem;
+  query_ = &query;
+  before_ = query.checks();
+  path_ = {};
+  rng_ = Rng(settings_.seed + 0x632be59bd9b4e019ULL * (problem.number + 1));
+  roots_.clear();
+  from_start_.clear();
+  from_goal_.clear();
+  tried_ = attempt_ = 0;
+  bounds_ = box_;
+  finder_.begin(problem_);
+  phase_ = Phase::first_root;
+  start_clearance_ = query.clearance(problem_.start, -1.0);
+  if (start_clearance_ <= 0.0) return end("the arm is in contact where it is");
+  bounds_.lower = bounds_.lower.cwiseMin(problem_.start);
+  bounds_.upper = bounds_.upper.cwiseMax(problem_.start);
+}
+
+bool Search::Run::advance(long checks) {
+  const long until = used() + checks;
+  while (phase_ != Phase::ended && used() < until) step();
+  return phase_ == Phase::ended;
+}
+
+void Search::Run::step() {
+  switch (phase_) {
+    case Phase::first_root:
+      return find_first_root();
+    case Phase::straight:
+      return try_straight();
+    case Phase::grow:
+      return grow();
+    case Phase::connect:
+      return connect();
+    case Phase::shorten:
+      if (shortening_.step(*query_, rng_)) {
+        improve_until_ = used() + settings_.improve_checks;
+        phase_ = Phase::improve;
+      }
+      return;
+    case Phase::improve:
+      return improve();
+    case Phase::ended:
+      return;
+  }
+}
+
+void Search::Run::find_first_root() {
+  if (!finder_.tries(0)) return end("no clear configuration was found at the goal");
+  Root root;
+  if (!finder_.attempt(*query_, rng_, root)) return;
+  add_root(root);
+  set_margins();
+  from_start_.add(problem_.start, -1);
+  phase_ = Phase::straight;
+}
+
+void Search::Run::add_root(const Root& root) {
+  roots_.push_back(root);
+  bounds_.lower = bounds_.lower.cwiseMin(root.q);
+  bounds_.upper = bounds_.upper.cwiseMax(root.q);
+}
+
+void Search::Run::set_margins() {
+  margins_.emplace(attempts[attempt_].share * settings_.margin_m, weights_);
+  margins_->add(problem_.start, std::max(0.0, start_clearance_ - start_slack_m), near_start,
+                far_start);
+  for (const Root& root : roots_)
+    margins_->add(root.q,
+                  std::max(std::min(settings_.least_m, 0.5 * root.clearance),
+                           root.clearance - settings_.slack_m),
+                  near_goal, far_goal);
+  query_->set_margins(*margins_);
+}
+
+// The straight way to a root, which nothing can shorten.
+void Search::Run::try_straight() {
+  const Root& root = roots_[tried_++];
+  if (query_->motion_clear(problem_.start, root.q)) {
+    MatrixXd points(root.q.size(), 2);
+    points << problem_.start, root.q;
+    return found_first(points);
+  }
+  from_goal_.add(root.q, -1);
+  if (tried_ < roots_.size()) return;
+  next_root_ = used() + root_checks;
+  phase_ = Phase::grow;
+}
+
+void Search::Run::look_for_roots() {
+  next_root_ = used() + root_checks;
+  Root root;
+  if (!finder_.attempt(*query_, rng_, root)) return;
+  add_root(root);
+  set_margins();
+  phase_ = Phase::straight;
+}
+
+void Search::Run::draw() {
+  if (rng_.uniform() >= near_share) {
+    for (Index j = 0; j < sample_.size(); ++j)
+      sample_[j] = rng_.uniform(bounds_.lower[j], bounds_.upper[j]);
+    return;
+  }
+  const auto k = static_cast<std::size_t>(rng_.below(roots_.size() + 1));
+  const VectorXd& center = k < roots_.size() ? roots_[k].q : problem_.start;
+  for (Index j = 0; j < sample_.size(); ++j)
+    sample_[j] = std::clamp(center[j] + near_spread / weights_[j] * rng_.normal(),
+                            bounds_.lower[j], bounds_.upper[j]);
+}
+
+// The smaller tree grows towards a sample.
+void Search::Run::grow() {
+  const double share = attempts[attempt_].used;
+  if (static_cast<double>(used()) >= share * static_cast<double>(settings_.checks_max))
+    return next_margins();
+  if (used() >= next_root_ && finder_.tries(roots_.size())) return look_for_roots();
+  grows_start_ = from_start_.size() <= from_goal_.size();
+  Tree& tree = grows_start_ ? from_start_ : from_goal_;
+  draw();
+  const int near = tree.nearest(sample_);
+  at_ = tree.q(near);
+  const double distance = weighted_distance(weights_, at_, sample_);
+  if (distance < met) return;
+  if (distance > range) sample_ = at_ + range / distance * (sample_ - at_);
+  if (!query_->motion_clear(at_, sample_)) return;
+  node_ = tree.add(sample_, near);
+  phase_ = Phase::connect;
+}
+
+// The other tree tries the whole line to the new node.
+void Search::Run::connect() {
+  phase_ = Phase::grow;
+  Tree& other = grows_start_ ? from_goal_ : from_start_;
+  const int near = other.nearest(sample_);
+  at_ = other.q(near);
+  const bool same = weighted_distance(weights_, at_, sample_) < met;
+  if (!same && !query_->motion_clear(at_, sample_)) return;
+  grows_start_ ? join(node_, near) : join(near, node_);
+}
+
+void Search::Run::join(int in_start, int in_goal) {
+  std::vector<VectorXd> points;
+  for (int i = in_start; i >= 0; i = from_start_.parent(i)) points.emplace_back(from_start_.q(i));
+  std::reverse(points.begin(), points.end());
+  for (int i = in_goal; i >= 0; i = from_goal_.parent(i))
+    if ((VectorXd(from_goal_.q(i)) - points.back()).norm() > met)
+      points.emplace_back(from_goal_.q(i));
+  MatrixXd matrix(problem_.start.size(), static_cast<Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i) matrix.col(static_cast<Index>(i)) = points[i];
+  found_first(matrix);
+}
+
+void Search::Run::found_first(const MatrixXd& points) {
+  path_.planned = points;
+  path_.first_checks = used();
+  shortening_.begin(points);
+  phase_ = settings_.shortens ? Phase::shorten : Phase::improve;
+  improve_until_ = 0;
+}
+
+void Search::Run::improve() {
+  if (used() >= improve_until_ || shortening_.points().cols() <= 2) return finish();
+  const long before = used();
+  shortening_.improve(*query_, rng_);
+  if (used() == before) --improve_until_;  // a search must end although nothing was tried
+}
+
+void Search::Run::next_margins() {
+  path_.states += from_start_.size() + from_goal_.size();
+  from_start_.clear();
+  from_goal_.clear();
+  if (++attempt_ == attempts.size())
+    return end(fmt::format("no path was found within {} checks", settings_.checks_max));
+  set_margins();
+  from_start_.add(problem_.start, -1);
+  tried_ = 0;
+  phase_ = Phase::straight;
+}
+
+void Search::Run::finish() {
+  path_.points = shortening_.points();
+  path_.length = path_length(path_.points);
+  path_.margin_m = margins_->full_m();
+  path_.states += from_start_.size() + from_goal_.size();
+  end({});
+}
+
+void Search::Run::end(std::string cause) {
+  path_.cause = std::move(cause);
+  path_.checks = used();
+  path_.roots = static_cast<int>(roots_.size());
+  phase_ = Phase::ended;
+}
+
+}  // namespace hamelin::search

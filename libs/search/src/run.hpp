@@ -1,0 +1,67 @@
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "hamelin/search/search.hpp"
+#include "roots.hpp"
+#include "shortening.hpp"
+#include "tree.hpp"
+
+namespace hamelin::search {
+
+/// One search, which continues motion by motion: docs/theory.md, chapter 17.
+class Search::Run {
+ public:
+  Run(const model::Model& model, const Settings& settings);
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
+  ~Run() = default;
+
+  void begin(const Problem& problem, Query& query);
+  bool advance(long checks);
+  [[nodiscard]] const Path& path() const noexcept { return path_; }
+
+ private:
+  enum class Phase { first_root, straight, grow, connect, shorten, improve, ended };
+  void step();
+  void find_first_root();
+  /// Takes up the search again with the next, smaller margin. Ends it if there is none.
+  void next_margins();
+  void add_root(const Root& root);
+  void set_margins();
+  void try_straight();
+  void look_for_roots();
+  void grow();
+  void connect();
+  void draw();
+  void join(int in_start, int in_goal);
+  void found_first(const Eigen::MatrixXd& points);
+  void improve();
+  void finish();
+  void end(std::string cause);
+  [[nodiscard]] long used() const { return query_->checks() - before_; }
+
+  const Settings& settings_;
+  Eigen::VectorXd weights_;
+  dynamics::JointBox box_, bounds_;
+  Roots finder_;
+  Shortening shortening_;
+  Tree from_start_, from_goal_;
+  Problem problem_;
+  Query* query_ = nullptr;
+  Rng rng_{0};
+  Phase phase_ = Phase::ended;
+  long before_ = 0;  ///< checks of the query
+  double start_clearance_ = 0.0;
+  std::size_t attempt_ = 0;  ///< of the margins
+  std::vector<Root> roots_;
+  std::size_t tried_ = 0;  ///< roots to which the straight line was tried
+  long next_root_ = 0, improve_until_ = 0;
+  std::optional<Margins> margins_;
+  bool grows_start_ = true;
+  int node_ = 0;  ///< that the other tree is to be connected with
+  Eigen::VectorXd sample_, at_;
+  Path path_;
+};
+
+}  // namespace hamelin::search
