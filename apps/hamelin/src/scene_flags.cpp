@@ -51,11 +51,11 @@ void add_seed_option(CLI::App& command, SceneFlags& flags) {
 }
 
 void add_guide_option(CLI::App& command, SceneFlags& flags) {
-  restrict_values(
-      command.add_option("--guide", flags.guide,
-                         "planner of OMPL that searches a path to each goal (default the scene's, "
-                         "or none)"),
-      {"none", "rrt", "rrt-connect", "rrt-star", "bit-star", "informed-rrt-star"});
+  restrict_values(command.add_option(
+                      "--guide", flags.guide,
+                      "who is given paths to goals: planners that ask for them, nobody, or every "
+                      "planner (default the scene's, or on-request)"),
+                  {"on-request", "none", "rrt-connect"});
 }
 
 std::vector<std::filesystem::path> files_of(const scene::Scene& scene) {

@@ -313,6 +313,9 @@ bool Plugin::follows_trajectories() const noexcept {
 bool Plugin::follows_paths() const noexcept {
   return (library_->raw->properties & HAMELIN_FOLLOWS_PATHS) != 0;
 }
+bool Plugin::asks_for_paths() const noexcept {
+  return (library_->raw->properties & HAMELIN_ASKS_FOR_PATHS) != 0;
+}
 bool Plugin::can_change_params() const noexcept {
   return library_->raw->prepare_params != nullptr;
 }
@@ -409,6 +412,7 @@ struct LoadedPlanner::Instance {
     host.closest_ahead = &Instance::closest_ahead;
     host.obstacles_ahead = &Instance::obstacles_ahead;
     host.draw_path = &Instance::draw_path;
+    host.request_path = &Instance::request_path;
     error[0] = '\0';
   }
   Instance(const Instance&) = delete;
@@ -492,6 +496,12 @@ struct LoadedPlanner::Instance {
   static void draw_path(void* context, const double* points_world_m, std::size_t count) noexcept {
     auto& self = *static_cast<Instance*>(context);
     self.guarded([&] { self.services->draw_path({points_world_m, 3 * count}); });
+  }
+  static std::int32_t request_path(void* context) noexcept {
+    auto& self = *static_cast<Instance*>(context);
+    bool will_search = false;
+    self.guarded([&] { will_search = self.services->request_path(); });
+    return will_search ? 1 : 0;
   }
   static std::int32_t declare_series(void* context, const char* name, const char* unit) noexcept {
     auto& self = *static_cast<Instance*>(context);

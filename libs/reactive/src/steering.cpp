@@ -36,7 +36,7 @@ Steering::Steering(const planning::Host& host, const planning::Setup& setup,
                    const model::Model& model, const LawParams& law, const Margins& margins,
                    const SteeringParams& params)
     : setup_(setup),
-      surroundings_(host, setup, model),
+      surroundings_(host, setup),
       prediction_(setup, model, law, margins, surroundings_),
       turner_(setup.dof()),
       params_(params),

@@ -588,7 +588,8 @@ std::vector<Event> read_events(const Reader& in, const std::filesystem::path& fo
 
 GuideSpec read_guide(const Reader& planner) {
   GuideSpec guide;
-  guide.type = guide_type(planner.get<std::string>("guide", "none")).value_or(GuideType::none);
+  guide.type =
+      guide_type(planner.get<std::string>("guide", "on-request")).value_or(GuideType::on_request);
   const Reader options = planner.child("guide_options");
   guide.margin_m = options.maybe<double>("margin_m");
   guide.checks_max = options.get("checks_max", guide.checks_max);

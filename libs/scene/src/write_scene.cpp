@@ -277,26 +277,18 @@ std::string_view to_string(SafetyType type) noexcept {
 
 std::string_view to_string(GuideType type) noexcept {
   switch (type) {
+    case GuideType::on_request:
+      return "on-request";
     case GuideType::none:
       return "none";
-    case GuideType::rrt:
-      return "rrt";
     case GuideType::rrt_connect:
       return "rrt-connect";
-    case GuideType::rrt_star:
-      return "rrt-star";
-    case GuideType::bit_star:
-      return "bit-star";
-    case GuideType::informed_rrt_star:
-      return "informed-rrt-star";
   }
   return "";
 }
 
 std::optional<GuideType> guide_type(std::string_view name) noexcept {
-  for (const GuideType type :
-       {GuideType::none, GuideType::rrt, GuideType::rrt_connect, GuideType::rrt_star,
-        GuideType::bit_star, GuideType::informed_rrt_star})
+  for (const GuideType type : {GuideType::on_request, GuideType::none, GuideType::rrt_connect})
     if (name == to_string(type)) return type;
   return std::nullopt;
 }
@@ -392,7 +384,7 @@ Json resolved_json(const Scene& scene) {
   if (scene.plant != PlantType::hamelin) out["plant"] = {{"type", to_string(scene.plant)}};
   out["safety"] = safety_json(scene);
   out["planner"] = scene.planner ? choice_json(*scene.planner) : Json(nullptr);
-  if (scene.planner && scene.guide.type != GuideType::none) add_guide(scene.guide, out["planner"]);
+  if (scene.planner) add_guide(scene.guide, out["planner"]);
   out["integrator"] = choice_json(scene.integrator);
   out["stall"] = nullptr;
   if (scene.stall)

@@ -24,7 +24,7 @@ PredictedTurn::PredictedTurn(const planning::Host& host, const planning::Setup& 
       model_(setup.model()),
       law_(setup, model_, law_params(params)),
       drive_(setup, model_, radius_m, horizon_s),
-      surroundings_(host, setup, model_),
+      surroundings_(host, setup),
       margins_(setup, reactive::margins_in_scene(setup, {})),
       rest_(setup),
       u_(Eigen::VectorXd::Zero(setup.dof())) {

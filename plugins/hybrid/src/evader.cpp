@@ -23,13 +23,10 @@ Evader::Evader(const planning::Host& host, const planning::Setup& setup, const m
           1, static_cast<std::uint64_t>(std::lround(look_period_s / period_s_)))),
       movers_(host, model),
       arm_(model),
-      sweep_(movers_),
       trail_(setup.dof(), trail_points, trail_spacing),
       evasion_(setup.dof()),
       look_(setup, model, law, margins, host),
-      row_(Eigen::VectorXd::Zero(setup.dof())) {
-  sweep_.reserve(static_cast<std::size_t>(setup.dof()) + 1);
-}
+      row_(Eigen::VectorXd::Zero(setup.dof())) {}
 
 void Evader::set_params(const LookAheadParams& params, int budget, int steps) noexcept {
   look_.set_params(params);
@@ -40,7 +37,6 @@ void Evader::set_params(const LookAheadParams& params, int budget, int steps) no
 
 void Evader::reset() {
   trail_.clear();
-  sweep_.clear();
   trail_age_ = 0;
   look_.reset();
   ticks_ = 0;
@@ -63,7 +59,6 @@ void Evader::update(const planning::Tick& tick, const Arm& arm, const Course& co
   }
   arm_.place(model_, arm.ws);
   movers_.predict(0.0, places_[0]);
-  sweep_.record(tick.time_s(), places_[0]);
   if (evasion_.act == Act::back)
     trail_.forget(std::exchange(trail_age_, 0));
   else

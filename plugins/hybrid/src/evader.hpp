@@ -46,7 +46,6 @@ class Evader {
   /// [m]; none before the first look, and if nothing is near.
   [[nodiscard]] std::optional<double> clearance_ahead() const noexcept { return clearance_ahead_; }
   /// Where moving obstacles were.
-  [[nodiscard]] Sweep& sweep() noexcept { return sweep_; }
   /// Sets u to the velocity of the evasion; only where the arm evades.
   void velocity(const Eigen::VectorXd& q, Eigen::VectorXd& u) {
     evasion_velocity(evasion_, trail_, q, trail_age_, u);
@@ -65,7 +64,6 @@ class Evader {
   Movers movers_;
   scene::PlacedShapes arm_;
   std::array<Movers::Places, 2> places_;
-  Sweep sweep_;
   Trail trail_;
   Evasion evasion_;  ///< in force
   LookAhead look_;

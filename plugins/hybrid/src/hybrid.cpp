@@ -15,29 +15,22 @@
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "joint_path.hpp"
-#include "memory.hpp"
 #include "params_schema.hpp"
 #include "parts.hpp"
-#include "roots.hpp"
 #include "stall.hpp"
-#include "tree.hpp"
 #include "tuning.hpp"
-#include "vias.hpp"
 
 namespace hamelin::hybrid {
 namespace {
 
 using Eigen::VectorXd;
 
-// Distance of the carrot ahead of the arm on the goal's path and on an escape path [rad or m].
-constexpr double path_ahead = 0.25, escape_ahead = 0.15;
-// Stretch of a path ahead of a stall that is skipped, and searched afterwards [rad or m].
-constexpr double path_beyond = 1.0, path_regained = 2.0;
-constexpr int hurried_steps = 2;  // factor of the steps of a search where something moves
+// Distance of the carrot ahead of the arm on a path [rad or m].
+constexpr double path_ahead = 0.25;
 // The longest time for which an evasion keeps a stall from counting [s].
 constexpr double longest_wait_s = 6.0;
-// Largest |error| of a joint at a reached via and at the end of an escape path [rad or m].
-constexpr double via_reached = 0.1, escape_end_reached = 0.08;
+// Largest |error| of a joint at the end of a path to a target [rad or m].
+constexpr double path_end_reached = 0.1;
 // An arm that is kept from its target, farther than so far [m and ½ rad], for so long and up to
 // this share of the desired motion, searches a way to it. To a target that rests it does so a few
 // times.
@@ -53,34 +46,10 @@ double track_rate_within(double horizon_s) {
   return std::min(100.0, 0.5 / horizon_s);
 }
 
-/// The weight of each joint in searches: the largest distance from the joint to any point that it
-/// moves, relative to that of the other joints. Joints that move little of the arm need not vary as
-/// much.
-VectorXd lever_weights(const model::Model& model) {
-  const int n = model.dof();
-  dynamics::Workspace ws(model);
-  dynamics::forward_kinematics(model, ws, VectorXd::Zero(n));
-  VectorXd lever = VectorXd::Zero(n);
-  for (int j = n - 1; j >= 0; --j) {
-    double beyond =
-        j + 1 < n
-            ? lever[j + 1] + (ws.frames[static_cast<std::size_t>(j) + 1].p -
-                              ws.frames[static_cast<std::size_t>(j)].p)
-                                 .norm()
-            : (dynamics::tip_pose(model, ws).p() - ws.frames[static_cast<std::size_t>(j)].p).norm();
-    for (const auto& shape : model.shapes())
-      if (shape.link == j)
-        beyond = std::max({beyond, (shape.center - shape.half_axis).norm(),
-                           (shape.center + shape.half_axis).norm()});
-    lever[j] = beyond;
-  }
-  return (lever / (0.25 * std::max(1e-9, lever.maxCoeff()))).cwiseMin(1.0).cwiseMax(0.3);
-}
-
 class Hybrid final : public planning::Planner {
  public:
-  static constexpr std::uint32_t properties =
-      HAMELIN_FOLLOWS_TARGETS | HAMELIN_FOLLOWS_PATHS | HAMELIN_FOLLOWS_TRAJECTORIES;
+  static constexpr std::uint32_t properties = HAMELIN_FOLLOWS_TARGETS | HAMELIN_FOLLOWS_PATHS |
+                                              HAMELIN_FOLLOWS_TRAJECTORIES | HAMELIN_ASKS_FOR_PATHS;
 
   Hybrid(const planning::Host& host, const planning::Setup& setup, const Json& params)
       : host_(host),
@@ -89,35 +58,20 @@ class Hybrid final : public planning::Planner {
         initial_params_(params),
         law_(setup, model_, Tuning(setup, params).law),
         drive_(setup, model_, params["contact_radius_m"], params["horizon_s"]),
-        via_ws_(model_),
-        surroundings_(host, setup, model_),
+        surroundings_(host, setup),
         margins_(setup, Tuning(setup, params).margins),
-        box_(setup, lever_weights(model_)),
         evader_(host, setup_, model_, law_, margins_),
         follower_(setup, model_),
         stall_(params["stall_time_s"]),
-        memory_(setup, box_, params["max_escapes"]),
         contact_radius_(params["contact_radius_m"]),
-        max_escapes_(params["max_escapes"]),
+        searches_(params["escape"] == "search"),
         path_(setup.dof(), static_cast<Eigen::Index>(setup.path_points_max())) {
-    const std::string escape = params["escape"];
-    uses_memory_ = escape == "memory";
-    if (escape == "rollouts" || escape == "tree") {
-      const LawParams law = Tuning(setup, params).search_law;
-      rollout_ = std::make_unique<Rollout>(setup_, model_, law, margins_, surroundings_);
-      roots_ = std::make_unique<Roots>(setup_, model_, law, box_, surroundings_);
-      if (escape == "tree")
-        search_ = std::make_unique<Tree>(setup_, *rollout_, *roots_, box_, margins_, surroundings_,
-                                         params["search_budget"].get<int>());
-      else
-        search_ = std::make_unique<Vias>(setup_, *rollout_, *roots_, box_);
-    }
     if (params["steering"].get<bool>()) {
       steering_ = std::make_unique<Steering>(
           host, setup_, model_, Tuning(setup, params).law, margins_,
           SteeringParams{turn_kinds(params["turns"].get<std::string>())});
     }
-    u_ = via_ = lower_ = upper_ = scratch_ = VectorXd::Zero(setup.dof());
+    u_ = via_ = lower_ = upper_ = VectorXd::Zero(setup.dof());
     // Scenes in which nothing moves need no series.
     if (host.obstacles_ahead(0.0, HAMELIN_MOVING, {}) > 0) {
       evasion_series_ = host.declare_series("evasion", "");
@@ -133,9 +87,7 @@ class Hybrid final : public planning::Planner {
   }
   void apply_params(const Tuning& tuning) {
     law_.set_params(tuning.law);
-    if (rollout_) rollout_->set_params(tuning.search_law);
     if (steering_) steering_->set_params(tuning.law);
-    if (roots_) roots_->set_params(tuning.search_law);
     margins_.set_params(tuning.margins);
     follower_.set_params(tuning.follow);
     target_velocity_gain_ = tuning.target_velocity_gain;
@@ -150,7 +102,6 @@ class Hybrid final : public planning::Planner {
     joint_damping_ = tuning.joint_damping;
     stall_.set_stall_time(tuning.stall_time_s);
     drive_.set_params({acceleration_max_, tuning.filter_passes});
-    search_steps_ = tuning.search_steps;
     evader_.set_params(
         {velocity_gain_, follow_gain_, drive_acceleration_, acceleration_max_, rate_},
         tuning.look_budget, tuning.look_steps);
@@ -158,8 +109,6 @@ class Hybrid final : public planning::Planner {
 
   // A new start has a new goal_number, so set_goal() forgets what belongs to the goal.
   void reset(const planning::ConstVectorMap&, const planning::ConstVectorMap&) {
-    memory_.reset();
-    if (search_) search_->reset();
     evader_.reset();
     evades_since_s_ = 0.0;
   }
@@ -182,7 +131,7 @@ class Hybrid final : public planning::Planner {
     double closing_speed = 0.0;
     if (evader_.evades()) {
       evader_.velocity(drive_.q(), u_);
-    } else if (mode_ == Mode::search) {
+    } else if (mode_ == Mode::wait) {
       u_.setZero();
     } else if (follows() && mode_ == Mode::goal) {
       follow(tick);
@@ -224,9 +173,9 @@ class Hybrid final : public planning::Planner {
   }
 
  private:
-  // The arm heads for the goal, heads for a via of an escape, waits for a search, or follows an
-  // escape path.
-  enum class Mode { goal, via, search, escape_path };
+  // The arm heads for the goal, along its path if it has one; waits until it is shown where to wait
+  // for a path; or follows a path to where its target was.
+  enum class Mode { goal, wait, path_to_target };
 
   void enter(Mode mode, double time_s) {
     mode_ = mode;
@@ -239,19 +188,37 @@ class Hybrid final : public planning::Planner {
     const hamelin_goal& goal = tick.goal();
     goal_ = &goal;
     goal_number_ = tick.goal_number();
-    memory_.restart();
     if (steering_) steering_->restart();
-    escapes_ = 0;
     measure_margins_ = true;
     path_.clear();
-    const auto path = setup_.path(goal);
-    for (Eigen::Index i = 0; i < path.cols(); ++i) path_.add(path.col(i));
     path_position_ = 0.0;
     enter(Mode::goal, tick.time_s());
-    if (!follows()) return;
+    if (!follows()) {
+      take_path();
+      if (path_.empty() && searches_ && path_search() == HAMELIN_PATH_NOT_SOUGHT)
+        ask(tick.time_s());
+      return;
+    }
     anchor_.set(goal);
     follower_.start(drive_.q());
-    searches_target_ = false;
+    awaits_path_ = false;
+  }
+
+  void take_path() {
+    path_.clear();
+    const auto path = setup_.path(*goal_);
+    for (Eigen::Index i = 0; i < path.cols(); ++i) path_.add(path.col(i));
+    path_position_ = 0.0;
+  }
+  [[nodiscard]] std::int32_t path_search() const {
+    return HAMELIN_HAS_FIELD(goal_, hamelin_goal, path_search) ? goal_->path_search
+                                                               : HAMELIN_PATH_NOT_SOUGHT;
+  }
+  // Another goal follows, at which the arm waits for the path. @return whether there will be one
+  bool ask(double now) {
+    if (!host_.request_path()) return false;
+    enter(Mode::wait, now);
+    return true;
   }
 
   [[nodiscard]] bool follows() const { return goal_->type == HAMELIN_GOAL_FOLLOW; }
@@ -268,7 +235,7 @@ class Hybrid final : public planning::Planner {
 
   // Without a search, an arm that is kept from its target turns where that leads to it.
   [[nodiscard]] bool steers_to_target(double now) const {
-    return steering_ && !search_ && was_held_from_target(now);
+    return steering_ && !searches_ && was_held_from_target(now);
   }
   void turn_to_target(const planning::Tick& tick) {
     look_for_turns(tick, law_.distance(model_, drive_.ws(), drive_.q(), {goal_}));
@@ -311,11 +278,6 @@ class Hybrid final : public planning::Planner {
   }
 
   Target choose_target() {
-    if (mode_ == Mode::via) return {goal_, &memory_.via()};
-    if (mode_ == Mode::escape_path) {
-      escape_position_ = search_->path().carrot(escape_position_, drive_.q(), escape_ahead, via_);
-      return {goal_, &via_, escape_position_ < search_->path().length()};
-    }
     if (path_.empty()) return {goal_};
     path_position_ = path_.carrot(path_position_, drive_.q(), path_ahead, via_);
     return {goal_, &via_, path_position_ < path_.length()};
@@ -325,14 +287,8 @@ class Hybrid final : public planning::Planner {
   [[nodiscard]] Course course() {
     Course course{goal_};
     course.goal_number = goal_number_;
-    if (mode_ == Mode::search) {
+    if (mode_ == Mode::wait) {
       course.waits = true;
-    } else if (mode_ == Mode::via) {
-      course.via = &memory_.via();
-    } else if (mode_ == Mode::escape_path) {
-      course.path = &search_->path();
-      course.position = escape_position_;
-      course.ahead = escape_ahead;
     } else if (!path_.empty()) {
       course.path = &path_;
       course.position = path_position_;
@@ -348,8 +304,7 @@ class Hybrid final : public planning::Planner {
   // The length that remains: the distance from the target, and the path behind it.
   [[nodiscard]] double remaining(const Target& target) {
     double length = law_.distance(model_, drive_.ws(), drive_.q(), target);
-    if (mode_ == Mode::escape_path) length += search_->path().length() - escape_position_;
-    if (mode_ == Mode::goal && !path_.empty()) length += path_.length() - path_position_;
+    if (!path_.empty()) length += path_.length() - path_position_;
     return length;
   }
 
@@ -370,54 +325,56 @@ class Hybrid final : public planning::Planner {
     drive_.apply(command);
   }
 
-  // An arm that is kept from its target searches a way around while it goes on following. A target
-  // is never given up: it may come back.
+  // An arm that is kept from its target asks for a path to where it is, and goes on following. A
+  // target is never given up: it may come back.
   void check_target(double now, planning::Command& command) {
     command.disable_stall_rule();
-    if (!search_ && !steering_) return;
+    if (!searches_ && !steering_) return;
     const double distance = law_.distance(model_, drive_.ws(), drive_.q(), {goal_});
-    if (!search_) {
-      if (steering_->turn().on() || is_held_from_target(distance)) return;
-      if (was_held_from_target(now)) steering_->restart();
-      blocked_since_s_ = now;
+    if (mode_ == Mode::path_to_target) {
+      if (distance < target_away || path_has_ended(now)) resume_target(now);
       return;
     }
-    if (mode_ == Mode::escape_path) {
-      if (distance < target_away || escape_has_ended(now)) resume_target(now);
-      return;
-    }
-    if (searches_target_) {
-      if (!search_->advance(search_steps_)) return;
-      searches_target_ = false;
-      blocked_since_s_ = now;
-      if (search_->path().empty() || distance < target_away) return;
-      escape_position_ = 0.0;
-      return enter(Mode::escape_path, now);
-    }
+    if (awaits_path_) return take_path_to_target(now, distance);
+    if (steering_ && !searches_ && steering_->turn().on()) return;
     if (!is_held_from_target(distance)) blocked_since_s_ = now;
-    if (was_held_from_target(now)) search_target(now);
+    if (!was_held_from_target(now)) return;
+    blocked_since_s_ = now;
+    if (searches_)
+      search_target();
+    else
+      steering_->restart();
   }
 
   [[nodiscard]] bool is_held_from_target(double distance) const {
     return follower_.progress() <= target_blocked_share && distance >= target_away;
   }
 
-  // An escape towards a place of the target ends there, or where it is stuck.
-  [[nodiscard]] bool escape_has_ended(double now) {
+  void take_path_to_target(double now, double distance) {
+    if (path_search() == HAMELIN_PATH_SOUGHT) return;
+    awaits_path_ = false;
+    blocked_since_s_ = now;
+    if (path_search() != HAMELIN_PATH_FOUND || distance < target_away) return;
+    take_path();
+    enter(Mode::path_to_target, now);
+  }
+
+  // A path to a place of the target ends there, or where the arm is stuck.
+  [[nodiscard]] bool path_has_ended(double now) {
     if (stall_.stalled(now, remaining({goal_, &via_}), drive_.v().norm(), 1.0, drive_.held_back()))
       return true;
-    return escape_position_ >= search_->path().length() &&
-           (search_->path().end() - drive_.q()).lpNorm<Eigen::Infinity>() < via_reached;
+    return path_position_ >= path_.length() &&
+           (path_.end() - drive_.q()).lpNorm<Eigen::Infinity>() < path_end_reached;
   }
 
   void resume_target(double now) {
+    path_.clear();
     follower_.restart();
     blocked_since_s_ = now;
     enter(Mode::goal, now);
   }
 
-  void search_target(double now) {
-    blocked_since_s_ = now;
+  void search_target() {
     if (anchor_.searches > 0 && !anchor_.left_by(*goal_)) {
       if (anchor_.searches >= target_searches) return;
       ++anchor_.searches;
@@ -425,44 +382,23 @@ class Hybrid final : public planning::Planner {
       anchor_.set(*goal_);
       anchor_.searches = 1;
     }
-    host_.info("searches a way to the target");
-    surroundings_.count(nullptr);
-    search_->begin(anchor_.goal(), drive_.q(), nullptr, 0.0);
-    searches_target_ = true;
+    awaits_path_ = host_.request_path();
+    if (awaits_path_) host_.info("searches a way to the target");
   }
 
   void check_stall(double now, const Target& target, double closing_speed,
                    planning::Command& command) {
-    if (searches() || steering_) command.disable_stall_rule();
-    if (mode_ == Mode::search) return continue_search(now);
+    if (searches_ || steering_) command.disable_stall_rule();
+    if (mode_ == Mode::wait) return;
     if (!evader_.evades()) {
       evades_since_s_ = now;
     } else if (now - evades_since_s_ < longest_wait_s && !makes_no_progress(now, target)) {
       return stall_.restart(now);
     }
-    const bool stalled = stall_.stalled(now, remaining(target), drive_.v().norm(), closing_speed,
-                                        drive_.held_back()) ||
-                         makes_no_progress(now, target);
-    if (mode_ == Mode::via) {
-      const bool arrived = (memory_.via() - drive_.q()).lpNorm<Eigen::Infinity>() < via_reached;
-      if (!arrived && !stalled && now < via_until_s_) return;
-      // The via may lie beyond the blocked stretch.
-      if (!path_.empty())
-        path_position_ = path_.nearest(path_position_, path_regained, drive_.q(), scratch_);
-      return enter(Mode::goal, now);
-    }
-    if (mode_ == Mode::escape_path && escape_position_ >= search_->path().length()) {
-      const bool arrived =
-          (search_->path().end() - drive_.q()).lpNorm<Eigen::Infinity>() < escape_end_reached;
-      // The escape path of a tip goal ends at a solution of the goal, so it is followed to its end.
-      const bool stay = search_->arrives() && goal_->type != HAMELIN_GOAL_JOINT;
-      if (arrived && (stalled || !stay)) {
-        if (search_->arrives())
-          path_position_ = std::max(path_position_, search_->rejoin_arc_length());
-        return enter(Mode::goal, now);
-      }
-    }
-    if (stalled) start_escape(now, target, command);
+    if (stall_.stalled(now, remaining(target), drive_.v().norm(), closing_speed,
+                       drive_.held_back()) ||
+        makes_no_progress(now, target))
+      leave_stall(now, command);
   }
 
   // Where something moves, the arm may be driven to and fro, which the rule of stalls takes for
@@ -482,17 +418,15 @@ class Hybrid final : public planning::Planner {
   [[nodiscard]] bool steers_on(double now) const {
     constexpr double steered_s = 10.0;
     if (mode_ != Mode::goal || !path_.empty()) return false;
-    if (!searches()) return steering_->looks_in_vain() < Steering::looks_enough;
+    if (!searches_) return steering_->looks_in_vain() < Steering::looks_enough;
     return (steering_->turn().on() || steering_->arrives()) &&
            now - steering_->in_vain_since_s() < steered_s;
   }
 
-  [[nodiscard]] bool searches() const { return uses_memory_ || search_; }
-
   // Something that the path does not know bars it: turns lead past it and on to the goal. Where
-  // nothing moves, a search that rejoins the path is better.
+  // nothing moves, another path is better.
   [[nodiscard]] bool leaves_path() const {
-    return steering_ && !path_.empty() && (!searches() || evader_.active());
+    return steering_ && !path_.empty() && (!searches_ || evader_.active());
   }
   void leave_path(double now) {
     host_.info("stalled: turns lead on from the path");
@@ -502,42 +436,11 @@ class Hybrid final : public planning::Planner {
     enter(Mode::goal, now);
   }
 
-  void start_escape(double now, const Target& target, planning::Command& command) {
+  void leave_stall(double now, planning::Command& command) {
     if (leaves_path()) return leave_path(now);
     if (steering_ && steers_on(now)) return stall_.restart(now);
-    if (!searches() || escapes_ >= max_escapes_) return command.give_up(cause());
-    ++escapes_;
-    std::array<char, 64> line{};
-    const int size = std::snprintf(line.data(), line.size(), "stalled: escape %d", escapes_);
-    host_.info({line.data(), static_cast<std::size_t>(size)});
-    if (search_) {
-      // What moves may leave the way free, or come back to where it was: most searches assume the
-      // one, each third the other.
-      surroundings_.count(evader_.active() && escapes_ % 3 == 0 ? &evader_.sweep() : nullptr);
-      search_->begin(*goal_, drive_.q(), path_.empty() ? nullptr : &path_, path_position_);
-      return enter(Mode::search, now);
-    }
-    // On a path the distance from a point behind the blocked stretch counts.
-    if (!path_.empty()) path_.at(path_position_ + path_beyond, via_);
-    const auto distance = [&](const VectorXd& via) {
-      if (target.via == nullptr) dynamics::forward_kinematics(model_, via_ws_, via);
-      return law_.distance(model_, via_ws_, via, target);
-    };
-    const auto clear = [&](const VectorXd& via) {
-      return surroundings_.is_clear(via, margins_.params().full_m, margins_.params().self_m);
-    };
-    memory_.next(drive_.q(), distance, clear);
-    via_until_s_ = now + 1.2 + 0.05 * escapes_;
-    enter(Mode::via, now);
-  }
-
-  // The arm stands still while the search continues.
-  void continue_search(double now) {
-    // What moves does not wait for the search.
-    if (!search_->advance(evader_.active() ? hurried_steps * search_steps_ : search_steps_)) return;
-    if (search_->path().empty()) return enter(Mode::goal, now);
-    escape_position_ = 0.0;
-    enter(Mode::escape_path, now);
+    if (!searches_ || !ask(now)) return command.give_up(cause());
+    host_.info("stalled: asks for another path");
   }
 
   // The cause of a stall, from the multipliers of the filter.
@@ -578,39 +481,31 @@ class Hybrid final : public planning::Planner {
   Json initial_params_;
   Law law_;
   FilterDrive drive_;
-  dynamics::Workspace via_ws_;  ///< at way-points that are compared
   Surroundings surroundings_;
   Margins margins_;
-  JointBox box_;
   Evader evader_;
   Follower follower_;
   TargetAnchor anchor_;           ///< the last place of the target to which a way was searched
-  bool searches_target_ = false;  ///< whether such a search goes on
+  bool awaits_path_ = false;      ///< to there
   double blocked_since_s_ = 0.0;  ///< since when the arm has been kept from the target
   double evades_since_s_ = 0.0;
   double least_left_ = 0.0, progress_s_ = 0.0;  ///< least remaining length, and since when
   std::int32_t evasion_series_ = -1, clearance_series_ = -1;
   StallDetector stall_;
-  EscapeMemory memory_;
-  std::unique_ptr<Rollout> rollout_;
-  std::unique_ptr<Roots> roots_;
-  std::unique_ptr<Search> search_;
   std::unique_ptr<Steering> steering_;
   std::int32_t turn_series_ = -1;
   double velocity_gain_ = 0.0, follow_gain_ = 0.0, target_velocity_gain_ = 1.0,
          tracking_gain_ = 0.0, drive_acceleration_ = 0.0, acceleration_max_ = 0.0, brake_ = 0.0,
          rate_ = 0.0, joint_damping_ = 0.0, contact_radius_;
-  int max_escapes_, search_steps_ = 1;
-  bool uses_memory_ = false;
+  bool searches_;
   JointPath path_;
-  VectorXd u_, via_, lower_, upper_, scratch_;
+  VectorXd u_, via_, lower_, upper_;
   const hamelin_goal* goal_ = nullptr;  ///< of goal_number_
   std::uint64_t goal_number_ = 0;
   Mode mode_ = Mode::goal;
   bool tracks_ = false;          ///< the reference of a trajectory
   bool measure_margins_ = true;  ///< whether goal or margins have changed
-  int escapes_ = 0;
-  double path_position_ = 0.0, escape_position_ = 0.0, via_until_s_ = 0.0;
+  double path_position_ = 0.0;
 };
 
 }  // namespace
@@ -618,5 +513,5 @@ class Hybrid final : public planning::Planner {
 
 HAMELIN_PLANNER_PLUGIN(hamelin::hybrid::Hybrid, "hybrid", "0.1.0",
                        "Attraction, steering without work and short repulsion under a safety "
-                       "filter, with escape from stalls",
+                       "filter, along searched paths",
                        params_schema);

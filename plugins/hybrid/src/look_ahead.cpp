@@ -33,7 +33,7 @@ LookAhead::LookAhead(const planning::Setup& setup, const model::Model& model, La
       model_(model),
       law_(law),
       margins_(margins),
-      surroundings_(host, setup, model),
+      surroundings_(host, setup),
       movers_(host, model),
       trail_(setup.dof(), looked_trail_points, trail_spacing),
       ws_(model),

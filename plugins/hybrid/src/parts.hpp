@@ -4,7 +4,6 @@
 #include "hamelin/reactive/margins.hpp"
 #include "hamelin/reactive/movers.hpp"
 #include "hamelin/reactive/obstacles.hpp"
-#include "hamelin/reactive/rollout.hpp"
 #include "hamelin/reactive/safety_filter.hpp"
 #include "hamelin/reactive/steering.hpp"
 #include "hamelin/reactive/surroundings.hpp"

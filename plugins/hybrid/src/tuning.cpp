@@ -8,19 +8,17 @@ namespace {
 
 constexpr double joint_speed_share = 1.5;  // of the cruise speed, for |u| towards a target
 
-// These determine the crop of the map, the kind of search, or the size of memory.
-constexpr std::array fixed{"contact_radius_m", "escape",   "search_budget", "max_escapes",
-                           "horizon_s",        "steering", "turns"};
+// These determine the crop of the map, or what the planner is made of.
+constexpr std::array fixed{"contact_radius_m", "escape", "horizon_s", "steering", "turns"};
 
 double value_or(const Json& value, double otherwise) {
   return value.is_null() ? otherwise : value.get<double>();
 }
 
 // A law ë = −k_p e − k_v ė is equivalent to following the velocity (k_p/k_v) e with the gain k_v.
-LawParams law_params(const Json& params, bool own_gains) {
-  const double gain = !own_gains || params["k_p"].is_null()
-                          ? 0.0
-                          : params["k_p"].get<double>() / value_or(params["k_v"], 1.0);
+LawParams law_params(const Json& params) {
+  const double gain =
+      params["k_p"].is_null() ? 0.0 : params["k_p"].get<double>() / value_or(params["k_v"], 1.0);
   return {gain > 0.0 ? gain : LawParams{}.joint_gain,
           gain > 0.0 ? gain : LawParams{}.tip_gain,
           params["cruise_speed"],
@@ -38,8 +36,7 @@ MarginParams margin_params(const planning::Setup& setup, const Json& params) {
 }  // namespace
 
 Tuning::Tuning(const planning::Setup& setup, const Json& params)
-    : law(law_params(params, true)),
-      search_law(law_params(params, false)),
+    : law(law_params(params)),
       margins(margin_params(setup, params)),
       follow{params["target_gain"],       params["tip_speed_m_s"],
              params["tip_turn_rad_s"],    joint_speed_share * params["cruise_speed"].get<double>(),
@@ -54,7 +51,6 @@ Tuning::Tuning(const planning::Setup& setup, const Json& params)
       joint_damping(params["joint_damping"]),
       stall_time_s(params["stall_time_s"]),
       filter_passes(params["filter_passes"]),
-      search_steps(params["search_steps"]),
       look_budget(params["look_budget"]),
       look_steps(params["look_steps"]) {}
 

@@ -9,13 +9,12 @@ namespace hamelin::hybrid {
 struct Tuning {
   Tuning(const planning::Setup& setup, const Json& params);
 
-  LawParams law;         ///< of the arm
-  LawParams search_law;  ///< of searches, which ignore k_p and k_v
+  LawParams law;
   MarginParams margins;
   FollowParams follow;
   double velocity_gain, follow_gain, target_velocity_gain, drive_acceleration, acceleration_max,
       brake_acceleration, approach_rate, joint_damping, stall_time_s;
-  int filter_passes, search_steps, look_budget, look_steps;
+  int filter_passes, look_budget, look_steps;
 };
 
 /// @throws Error invalid if `params` differ from `initial` in one that cannot change

@@ -38,17 +38,20 @@ Guidance::News Guidance::update(const Now& now, GuideSearch& search) {
   if (mode_ == Mode::off) return News::none;
   News news = News::none;
   if (awaits_) news = take(now, search);
-  if (!awaits_ && !wants_ && world_ != now.world) wants_ = true;
+  if (!follows() && !awaits_ && !wants_ && world_ != now.world) wants_ = true;
   if (wants_ && !search.busy()) ask(now, search);
-  if (mode_ == Mode::waiting) figures_.waited_s += now.period_s;
+  if (!follows() && mode_ == Mode::waiting) figures_.waited_s += now.period_s;
   if (mode_ == Mode::guided && !follows_paths_) show_next_point(now);
   return news;
 }
 
-// A goal with a path of its own needs no guide, and one that follows a target has no end.
+// A goal with a path of its own needs no other, and one that follows a target has no end: paths to
+// them are searched where the planner asks.
 void Guidance::begin(const Now& now) {
   goal_number_ = now.goal_number;
-  const bool guided = now.goal.type != scene::GoalType::follow && now.goal.path.cols() == 0;
+  follows_ = now.goal.type == scene::GoalType::follow;
+  const bool guided =
+      spec_.type != scene::GuideType::on_request && !follows() && now.goal.path.cols() == 0;
   mode_ = guided ? Mode::waiting : Mode::off;
   awaits_ = false;
   wants_ = guided;
@@ -57,10 +60,9 @@ void Guidance::begin(const Now& now) {
   if (guided) hold(now);
 }
 
-bool Guidance::stalled() {
-  if (mode_ == Mode::off) return false;
+bool Guidance::request() {
   if (mode_ == Mode::waiting) return true;
-  if (searches_ >= spec_.searches_max) return false;
+  if (!follows() && searches_ >= spec_.searches_max) return false;
   ++searches_;
   mode_ = Mode::waiting;
   awaits_ = false;
@@ -77,12 +79,16 @@ void Guidance::ask(const Now& now, GuideSearch& search) {
   request.goal.type = now.goal.type;
   if (now.goal.type == scene::GoalType::joint) request.goal.q = now.goal.q;
   request.goal.pose = now.goal.pose;
+  if (follows() && now.target != nullptr) {
+    request.goal.type = now.goal.position_only ? scene::GoalType::position : scene::GoalType::pose;
+    request.goal.pose = now.target->pose;
+  }
   request.goal.tolerance_m = now.goal.tolerance_m;
   request.goal.tolerance_rad = now.goal.tolerance_rad;
   request.search = asked_;
   request.kept_count = 0;
-  if (mode_ == Mode::guided) fill_kept(now, request);
-  if (mode_ == Mode::waiting && count_ == 0) {
+  if (mode_ == Mode::guided && !follows()) fill_kept(now, request);
+  if (mode_ == Mode::waiting && count_ == 0 && !follows()) {
     ++number_;
     hold(now);
   }
@@ -114,7 +120,7 @@ Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
   cause_.assign(answer.path.cause, 0, cause_max);
   if (mode_ == Mode::waiting) {
     mode_ = Mode::unguided;
-    ++number_;
+    if (!follows()) ++number_;
   }
   return News::no_path;
 }
@@ -127,7 +133,7 @@ void Guidance::set_path(const Now& now, const MatrixXd& points) {
   path_.col(place.line) += place.share * (path_.col(place.line + 1) - path_.col(place.line));
   mode_ = Mode::guided;
   point_ = place.line;
-  show(now, place.line, follows_paths_ ? count_ - place.line : 1);
+  show(now, place.line, follows_paths_ || follows() ? count_ - place.line : 1);
 }
 
 Guidance::Place Guidance::nearest(const VectorXd& q, double length) const {
@@ -163,7 +169,7 @@ void Guidance::hold(const Now& now) {
 }
 
 void Guidance::show(const Now& now, Index first, Index count) {
-  ++number_;
+  if (!follows()) ++number_;
   shown_ = {};
   shown_.struct_size = sizeof shown_;
   shown_.type = HAMELIN_GOAL_JOINT;
@@ -171,9 +177,20 @@ void Guidance::show(const Now& now, Index first, Index count) {
   shown_.tolerance_rad = shown_tolerance;
   shown_.speed_max = now.goal.speed_max;
   shown_.q = path_.col(first + count - 1).data();
+  shown_.path_search = mode_ == Mode::waiting ? HAMELIN_PATH_SOUGHT : HAMELIN_PATH_FOUND;
   if (!follows_paths_ || count == 1) return;
   shown_.path = path_.col(first).data();
   shown_.path_points = static_cast<std::size_t>(count);
+}
+
+void Guidance::tell(hamelin_goal& goal) const noexcept {
+  if (mode_ == Mode::off) return;
+  goal.path_search = mode_ == Mode::waiting  ? HAMELIN_PATH_SOUGHT
+                     : mode_ == Mode::guided ? HAMELIN_PATH_FOUND
+                                             : HAMELIN_PATH_NOT_FOUND;
+  if (mode_ != Mode::guided) return;
+  goal.path = shown_.path;
+  goal.path_points = shown_.path_points;
 }
 
 void Guidance::show_next_point(const Now& now) {

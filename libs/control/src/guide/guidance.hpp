@@ -12,10 +12,11 @@
 
 namespace hamelin::control {
 
-/// What a planner is shown in place of each goal: a joint goal with the path that a guide found.
+/// What a planner is shown in place of a goal: a joint goal with the path that a search found.
 /// Until it has one, the arm holds its place; if none is found, the planner is shown the goal
-/// itself. The guide is asked again where the arm stalls, and where the world changes. One thread;
-/// no allocation after construction.
+/// itself. Searches begin at each goal or where the planner asks, and again where the arm stalls,
+/// and where the world changes. A goal that follows a target stays what it is, and gets the path
+/// besides. One thread; no allocation after construction.
 class Guidance {
  public:
   /// @param points_max the largest number of way-points of a path
@@ -32,20 +33,26 @@ class Guidance {
   struct Now {
     double time_s, period_s;
     const Eigen::VectorXd& q;
-    const scene::Goal& goal;    ///< the current one
-    std::uint64_t goal_number;  ///< another one whenever the goal or the load is another one
-    std::uint64_t world;        ///< number of the snapshot
+    const scene::Goal& goal;           ///< the current one
+    std::uint64_t goal_number;         ///< another one whenever the goal or the load is another one
+    std::uint64_t world;               ///< number of the snapshot
+    const scene::MotionState* target;  ///< that a follow goal has; else null
   };
   /// To be called once per tick, before the planner. @return what has arrived
   News update(const Now& now, GuideSearch& search);
-  /// The arm does not make progress. @return whether the guide will search again
-  [[nodiscard]] bool stalled();
+  /// The planner asks for a path. @return whether one will be searched
+  [[nodiscard]] bool request();
+  /// The arm does not make progress. @return whether there will be another search, if there was one
+  /// at this goal
+  [[nodiscard]] bool stalled() { return mode_ != Mode::off && request(); }
   /// Whether the arm holds its place until a path arrives.
-  [[nodiscard]] bool waits() const noexcept { return mode_ == Mode::waiting; }
+  [[nodiscard]] bool waits() const noexcept { return !follows() && mode_ == Mode::waiting; }
   /// What the planner is shown; null: the goal itself.
   [[nodiscard]] const hamelin_goal* goal() const noexcept {
-    return mode_ == Mode::waiting || mode_ == Mode::guided ? &shown_ : nullptr;
+    return !follows() && (mode_ == Mode::waiting || mode_ == Mode::guided) ? &shown_ : nullptr;
   }
+  /// Adds what is known of paths to a goal that is shown as it is.
+  void tell(hamelin_goal& goal) const noexcept;
   /// Counts whatever is shown.
   [[nodiscard]] std::uint64_t number() const noexcept { return number_; }
   [[nodiscard]] const Figures& figures() const noexcept { return figures_; }
@@ -54,6 +61,7 @@ class Guidance {
 
  private:
   enum class Mode { off, waiting, guided, unguided };
+  [[nodiscard]] bool follows() const noexcept { return follows_; }
   void begin(const Now& now);
   void ask(const Now& now, GuideSearch& search);
   News take(const Now& now, GuideSearch& search);
@@ -71,6 +79,7 @@ class Guidance {
 
   scene::GuideSpec spec_;
   bool follows_paths_;
+  bool follows_ = false;  ///< whether the goal follows a target
   double check_time_s_;
   Mode mode_ = Mode::off;
   Eigen::MatrixXd path_;

@@ -183,7 +183,7 @@ void Controller::ask_planner() {
   goal_ = {goal_for_planner(), goal_.number, index};
   reset_ = false;
   const double since_s = options_.clock_s != nullptr ? options_.clock_s() : 0.0;
-  if (!arm_->planner.tick(k_, time_s_, q(), v(), goal_, arm_->drive->torques()))
+  if (!arm_->planner.tick(k_, time_s_, q(), v(), goal_, arm_->drive->torques(), guidance_.get()))
     return start_braking(StopReason::planner, arm_->planner.error());
   if (options_.clock_s != nullptr) note_time(options_.clock_s() - since_s);
   if (answer_.state == ControlState::stopping || !arm_->planner.gave_up() ||

@@ -134,7 +134,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       deadline_s_(scene_.actuation.deadline_s.value_or(period_s_)),
       path_points_max_(std::max(
           {longest_path(scene_.goals), options_.path_points_max.value_or(default_path_points),
-           scene_.guide.type != scene::GuideType::none ? guide_path_points : std::size_t{0}})),
+           searches_paths(scene_, plugin) ? guide_path_points : std::size_t{0}})),
       plugin_(plugin),
       nominal_(nominal_of(scene_, arm)),
       drive_options_(std::make_unique<DriveOptions>(

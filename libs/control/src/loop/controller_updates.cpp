@@ -310,17 +310,19 @@ void Controller::update_reference() {
 
 const hamelin_goal* Controller::goal_for_planner() {
   if (guidance_ && guidance_->goal() != nullptr) return guidance_->goal();
-  if (answer_.target == nullptr && answer_.reference == nullptr) return listed_;
+  if (answer_.target == nullptr && answer_.reference == nullptr && !guidance_) return listed_;
   live_goal_ = *listed_;
+  if (guidance_) guidance_->tell(live_goal_);
   if (answer_.target != nullptr) control::set_target(*answer_.target, live_goal_);
   if (answer_.reference != nullptr) control::set_reference(*answer_.reference, live_goal_);
   return &live_goal_;
 }
 
 void Controller::update_guidance() {
-  const Guidance::News news = guidance_->update(
-      {time_s_, period_s_, q(), goals_.goal(), listed_number_ + 1, arm_->view.snapshot()},
-      *arm_->guide);
+  const Guidance::News news =
+      guidance_->update({time_s_, period_s_, q(), goals_.goal(), listed_number_ + 1,
+                         arm_->view.snapshot(), answer_.target},
+                        *arm_->guide);
   if (const std::uint64_t number = guidance_->number(); number != guidance_number_) {
     guidance_number_ = number;
     ++goal_.number;

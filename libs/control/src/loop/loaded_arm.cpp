@@ -46,9 +46,14 @@ std::unique_ptr<Shield> LoadedArm::make_shield(const scene::Scene& scene,
                                   arm.drive.changes(scene));
 }
 
+bool searches_paths(const scene::Scene& scene, const planning::Plugin& plugin) noexcept {
+  return scene.guide.type == scene::GuideType::rrt_connect ||
+         (scene.guide.type == scene::GuideType::on_request && plugin.asks_for_paths());
+}
+
 std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, const Json& params,
                                                    const ArmSetup& arm) {
-  if (scene.guide.type == scene::GuideType::none) return nullptr;
+  if (!searches_paths(scene, arm.plugin)) return nullptr;
   return std::make_unique<GuideSearch>(
       model, arm.world, view,
       guide_settings(scene, model, view, shield ? shield->limit_reserve() : LimitReserve{}, params),

@@ -29,6 +29,10 @@ struct ArmSetup {
   bool guide_thread;  ///< whether a guide searches on a thread of its own
 };
 
+/// Whether paths are searched for a planner.
+[[nodiscard]] bool searches_paths(const scene::Scene& scene,
+                                  const planning::Plugin& plugin) noexcept;
+
 /// The arm as a controller knows it with what it carries, and all that depends on its masses and
 /// shapes: its view of the world, its shield, its planner, and how channels become a torque. Where
 /// something is attached or detached, another object takes its place: made on any thread, and

@@ -100,7 +100,7 @@ void PlannerHost::restart(planning::SetupData setup, const Json& params) {
 }
 
 bool PlannerHost::tick(long k, double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                       const PlannerGoal& goal, const Torques& torques) {
+                       const PlannerGoal& goal, const Torques& torques, Guidance* guidance) {
   time_s_ = time_s;
   draws_ = false;
   if (const std::uint64_t world = view_.snapshot(); world != world_number_) {
@@ -133,7 +133,10 @@ bool PlannerHost::tick(long k, double time_s, const Eigen::VectorXd& q, const Ei
   tick.disturbance = torques.disturbance != nullptr ? torques.disturbance->data() : nullptr;
   tick.moving_count = list_obstacles(view_.environment(), view_.obstacle_ids(), time_s,
                                      scene::Among::moving, {nullptr, 0, 0});
-  return planner_.tick(tick, command_);
+  guidance_ = guidance;
+  const bool answered = planner_.tick(tick, command_);
+  guidance_ = nullptr;
+  return answered;
 }
 
 void PlannerHost::log(std::int32_t level, std::string_view line) {

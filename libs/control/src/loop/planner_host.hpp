@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "guide/guidance.hpp"
 #include "hamelin/control/answer.hpp"
 #include "hamelin/control/line_buffer.hpp"
 #include "hamelin/control/world.hpp"
@@ -33,8 +34,9 @@ class PlannerHost final : private planning::HostServices {
   /// @param k, time_s index and time of the tick
   /// @param q, v as measured; dof numbers each @param torques of the drive
   /// @return false if the planner failed: see error()
+  /// @param guidance that it may ask for paths; null: none
   [[nodiscard]] bool tick(long k, double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                          const PlannerGoal& goal, const Torques& torques);
+                          const PlannerGoal& goal, const Torques& torques, Guidance* guidance);
   /// Tells the planner that the next tick is a new start.
   void reset(const Eigen::VectorXd& q, const Eigen::VectorXd& v) noexcept { planner_.reset(q, v); }
   /// Makes the planner again. @throws Error as the constructor
@@ -76,6 +78,7 @@ class PlannerHost final : private planning::HostServices {
   std::size_t obstacles_ahead(double time_ahead_s, std::int32_t kinds,
                               planning::ArrayOut<hamelin_obstacle_state> out) override;
   void draw_path(std::span<const double> points_world_m) override;
+  bool request_path() override { return guidance_ != nullptr && guidance_->request(); }
   std::unique_ptr<planning::QueryServices> open_query() override;
 
   const model::Model& nominal_;
@@ -87,7 +90,8 @@ class PlannerHost final : private planning::HostServices {
   std::vector<scene::SelfContact> query_self_contacts_;
   std::vector<hamelin_contact> contacts_;
   std::vector<hamelin_self_contact> self_contacts_;
-  std::atomic<double> time_s_;  ///< of the last tick
+  std::atomic<double> time_s_;    ///< of the last tick
+  Guidance* guidance_ = nullptr;  ///< during a tick
   Drawing drawing_;
   bool draws_ = false;               ///< whether it drew a line in this tick
   std::uint64_t world_number_ = 0;   ///< that the planner knows

@@ -375,6 +375,12 @@ class Host {
       raw_->draw_path(raw_->context, reinterpret_cast<const double*>(points_world.data()),
                       points_world.size());
   }
+  /// Asks for a path to the current goal, see hamelin_host.request_path. For the planner's tick.
+  /// @return whether one will be searched; hosts that are older than this function search none
+  [[nodiscard]] bool request_path() const {
+    return HAMELIN_HAS_FIELD(raw_, hamelin_host, request_path) &&
+           raw_->request_path(raw_->context) != 0;
+  }
   /// Declares a series of numbers for log and report, for Command::set_series(). For the planner's
   /// constructor.
   /// @param unit may be empty

@@ -132,6 +132,15 @@ enum {
   HAMELIN_GOAL_FOLLOW = 3
 };
 
+/* What is known of a path to a goal: nobody has asked for one; it is being searched; it is there; none
+ * was found. */
+enum {
+  HAMELIN_PATH_NOT_SOUGHT = 0,
+  HAMELIN_PATH_SOUGHT = 1,
+  HAMELIN_PATH_FOUND = 2,
+  HAMELIN_PATH_NOT_FOUND = 3
+};
+
 typedef struct hamelin_goal {
   uint32_t struct_size;
   int32_t type;
@@ -160,6 +169,8 @@ typedef struct hamelin_goal {
   /* How fast that clock runs: 1, or less while the arm is held up, down to 0. It is contained in
    * reference_v and reference_a. */
   double reference_rate;
+  /* HAMELIN_PATH_NOT_SOUGHT, ...: see hamelin_host.request_path. */
+  int32_t path_search;
 } hamelin_goal;
 
 /* A gyroscopic term: the force w x (velocity of the point) acts at a point of a link. It does no
@@ -376,6 +387,14 @@ typedef struct hamelin_host {
    * log and report, such as the path of the tip that the planner considers. The lines of a tick
    * are drawn together, until a later tick draws others. */
   void (*draw_path)(void* context, const double* points_world_m, size_t count);
+  /* [tick, inside tick only] Asks for a collision-free path to the current goal. Returns 1 if it will
+   * be searched, and 0 if there is no search or it has been asked too often at this goal. If it is
+   * 1, later ticks have another goal in place of the current one: at first a joint goal where the
+   * arm is, so that it waits there; then a joint goal with the path, or the goal itself if none was
+   * found. hamelin_goal.path_search says which. A goal that follows a target stays, and its path leads
+   * to where the target was. Paths follow the map: where it changes, what is left of a path is
+   * proved again, or searched anew. Only planners with the property HAMELIN_ASKS_FOR_PATHS may ask. */
+  int32_t (*request_path)(void* context);
 } hamelin_host;
 
 /* hamelin_plugin.properties: what a planner does not promise, and what it can do besides. */
@@ -386,7 +405,8 @@ enum {
   /* It follows the paths of joint goals. Where a guide searches paths, other planners are shown
    * the way-points as joint goals, one after the other. */
   HAMELIN_FOLLOWS_PATHS = 8,
-  HAMELIN_FOLLOWS_TRAJECTORIES = 16 /* it accepts joint goals with a trajectory */
+  HAMELIN_FOLLOWS_TRAJECTORIES = 16, /* it accepts joint goals with a trajectory */
+  HAMELIN_ASKS_FOR_PATHS = 32        /* it calls hamelin_host.request_path, if it needs paths */
 };
 
 /* All functions never throw. They are called on one thread, that of tick, unless stated otherwise;

@@ -108,6 +108,9 @@ class HostServices {
   }
   /// Draws a line of points of the world, three numbers each [m]. The default draws nothing.
   virtual void draw_path(std::span<const double> /*points_world_m*/) {}
+  /// Asks for a path to the current goal. @return whether it will be searched. The default has no
+  /// search.
+  virtual bool request_path() { return false; }
   /// Makes a query; may be called by any thread. The default world is empty space.
   virtual std::unique_ptr<QueryServices> open_query();
 };
@@ -230,6 +233,8 @@ class Plugin {
   [[nodiscard]] bool follows_targets() const noexcept;
   /// Whether it follows the paths of joint goals.
   [[nodiscard]] bool follows_paths() const noexcept;
+  /// Whether it may ask for paths.
+  [[nodiscard]] bool asks_for_paths() const noexcept;
   /// Whether it accepts joint goals with a trajectory.
   [[nodiscard]] bool follows_trajectories() const noexcept;
   /// Whether its planners' parameters can be changed while they run, and whether they can be told

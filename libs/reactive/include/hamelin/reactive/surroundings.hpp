@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "hamelin/planning/plugin.hpp"
-#include "hamelin/reactive/sweep.hpp"
 
 namespace hamelin::reactive {
 
@@ -12,17 +11,12 @@ namespace hamelin::reactive {
 /// constructor allocates.
 class Surroundings {
  public:
-  Surroundings(const planning::Host& host, const planning::Setup& setup, const model::Model& model)
+  Surroundings(const planning::Host& host, const planning::Setup& setup)
       : host_(host),
-        model_(model),
-        ws_(model),
-        arm_(model),
         self_collision_(setup.self_collision()),
         contacts_(setup.shapes().size() * 4 + 16),
         self_contacts_(self_collision_ ? setup.shapes().size() * 4 + 16 : 0) {}
 
-  /// What counts in addition to what stands still; null: nothing.
-  void count(Sweep* sweep) noexcept { sweep_ = sweep; }
   /// Finds the contacts at q up to `radius` from obstacles and the self contacts up to
   /// `self_radius` [m]. @param ahead_s time at which moving obstacles count where they are
   /// predicted to be; below 0 they do not count
@@ -34,7 +28,6 @@ class Surroundings {
                                      moving ? HAMELIN_STANDING | HAMELIN_MOVING : HAMELIN_STANDING,
                                      radius, contacts_),
                  contacts_.size());
-    if (sweep_ != nullptr) add_sweep(q, radius);
     self_count_ = 0;
     if (self_collision_)
       self_count_ =
@@ -51,40 +44,12 @@ class Surroundings {
   [[nodiscard]] bool is_clear(const Eigen::VectorXd& q, double margin, double self_margin) {
     const std::span<const double> at(q.data(), static_cast<std::size_t>(q.size()));
     if (host_.closest_ahead(at, 0.0, HAMELIN_STANDING, margin, {}) > 0) return false;
-    if (sweep_ != nullptr && sweep_->clearance(place(q), margin) < margin) return false;
     return !self_collision_ || host_.closest_self(at, self_margin, {}) == 0;
   }
 
  private:
-  [[nodiscard]] scene::Shapes place(const Eigen::VectorXd& q) {
-    dynamics::forward_kinematics(model_, ws_, q);
-    arm_.place(model_, ws_);
-    return arm_.view();
-  }
-  void add_sweep(const Eigen::VectorXd& q, double radius) {
-    const scene::Shapes arm = place(q);
-    sweep_->each_near(arm, radius, [&](const MoverPoint& point) {
-      if (count_ == contacts_.size()) return;
-      hamelin_contact& contact = contacts_[count_++];
-      contact = {};
-      contact.shape = point.shape;
-      contact.obstacle = point.obstacle;
-      contact.distance_m = point.distance;
-      const Eigen::Vector3d on_arm =
-          point.axis_point - arm.radii[static_cast<std::size_t>(point.shape)] * point.direction;
-      planning::VectorMap(contact.arm_point_world_m, 3) = on_arm;
-      planning::VectorMap(contact.obstacle_point_world_m, 3) =
-          on_arm - point.distance * point.direction;
-      planning::VectorMap(contact.direction_world, 3) = point.direction;
-    });
-  }
-
   planning::Host host_;
-  const model::Model& model_;
-  dynamics::Workspace ws_;
-  scene::PlacedShapes arm_;
   bool self_collision_;
-  Sweep* sweep_ = nullptr;
   std::vector<hamelin_contact> contacts_;
   std::vector<hamelin_self_contact> self_contacts_;
   std::size_t count_ = 0, self_count_ = 0;

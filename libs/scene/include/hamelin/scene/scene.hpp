@@ -188,15 +188,9 @@ struct Choice {
   Json params = Json::object();
 };
 
-/// Which planner of OMPL searches the joint path along which the arm is guided to each goal.
-enum class GuideType : std::int32_t {
-  none,
-  rrt,
-  rrt_connect,
-  rrt_star,
-  bit_star,
-  informed_rrt_star
-};
+/// Who is given joint paths to goals, found by libs/search: planners that ask for them; nobody; or
+/// every planner, at each goal.
+enum class GuideType : std::int32_t { on_request, none, rrt_connect };
 
 /// The name in a scene file, such as "rrt-connect".
 [[nodiscard]] std::string_view to_string(GuideType type) noexcept;
@@ -205,13 +199,13 @@ enum class GuideType : std::int32_t {
 
 /// A guide, and how it searches.
 struct GuideSpec {
-  GuideType type = GuideType::none;
+  GuideType type = GuideType::on_request;
   /// Clearance that paths keep away from the start and goals [m]; none: somewhat more than the
   /// planner's margin.
   std::optional<double> margin_m;
-  long checks_max = 200000;     ///< after which a search ends without a path
-  long improve_checks = 20000;  ///< how long a planner that optimises goes on after its first path
-  int searches_max = 5;         ///< of a goal, after stalls
+  long checks_max = 200000;  ///< after which a search ends without a path
+  long improve_checks = 0;   ///< for which a path is improved after it was found
+  int searches_max = 5;      ///< of a goal, after stalls
   /// Simulated time that a check takes [s]. With real time nothing is charged.
   double check_time_s = 2e-6;
 };
