@@ -241,7 +241,7 @@ void add_make(CLI::App& parent, int& exit_code) {
 void add_planner_options(CLI::App& command, RunOptions& options) {
   command
       .add_option("--planner", options.planners,
-                  "planner, with parameters as in hybrid:escape=tree, with a guide as in "
+                  "planner, with parameters as in hybrid:escape=none, with a guide as in "
                   "hybrid+rrt-connect, or python:FILE:CLASS; may be repeated (default hybrid)")
       ->type_name("NAME")
       ->allow_extra_args(false);

@@ -148,7 +148,7 @@ void add_sweep_plan(CLI::App& sweep, int& exit_code) {
   command
       ->add_option(
           "--planner", plan.planners,
-          "planner, with parameters as in hybrid:escape=tree,margin_m=0.01, with a guide as "
+          "planner, with parameters as in hybrid:escape=none,margin_m=0.01, with a guide as "
           "in hybrid+rrt-connect, or python:FILE:CLASS; may be repeated (default the scene's)")
       ->type_name("NAME")
       ->allow_extra_args(false);

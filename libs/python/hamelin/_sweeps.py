@@ -110,7 +110,7 @@ def plan_sweep(
     """Plans a run per combination of scene, planner, value and seed, as `hamelin sweep plan`.
 
     directory: folder of the plan and of generated scenes. scenes: scene files and MotionBenchMaker
-    problems. planner: names, with parameters as in "hybrid:escape=tree", or "python:FILE:CLASS".
+    problems. planner: names, with parameters as in "hybrid:escape=none", or "python:FILE:CLASS".
     set: values for all runs, such as "/planner/params/gain=2". vary: values such as
     "/planner/params/gain=1,2", one run per combination. seeds: one run each. duration: longest
     simulated time [s].

@@ -186,14 +186,18 @@ py::dict goal_dict(const hamelin_goal& goal, std::size_t dof) {
   out["tolerance_m"] = goal.tolerance_m;
   out["tolerance_rad"] = goal.tolerance_rad;
   out["speed_max"] = goal.speed_max;
+  if (goal.path_points > 0) {
+    auto path =
+        new_array({static_cast<py::ssize_t>(goal.path_points), static_cast<py::ssize_t>(dof)});
+    std::memcpy(path.mutable_data(), goal.path, sizeof(double) * goal.path_points * dof);
+    out["path"] = path;
+  }
+  static constexpr std::array<const char*, 4> searches{"not sought", "sought", "found",
+                                                       "not found"};
+  if (const auto search = static_cast<std::size_t>(goal.path_search); search < searches.size())
+    out["path_search"] = searches[search];
   if (goal.q != nullptr) {
     out["q"] = numbers_at(goal.q, dof);
-    if (goal.path_points > 0) {
-      auto path =
-          new_array({static_cast<py::ssize_t>(goal.path_points), static_cast<py::ssize_t>(dof)});
-      std::memcpy(path.mutable_data(), goal.path, sizeof(double) * goal.path_points * dof);
-      out["path"] = path;
-    }
   } else {
     out["position_m"] = array3(goal.position_world_m);
     out["quaternion_wxyz"] = numbers_at(&goal.quaternion_wxyz[0], 4);
@@ -303,8 +307,8 @@ struct PySetup : Whole {
   [[nodiscard]] const Host& services() const {
     if (host == nullptr || thread != std::this_thread::get_id())
       throw Error(ErrorCode::usage,
-                  "PlannerSetup: log(), warn(), declare_series() and draw_path() are used outside "
-                  "of the planner's calls, expected in start() or tick()");
+                  "PlannerSetup: log(), warn(), declare_series(), draw_path() and request_path() are "
+                  "used outside of the planner's calls, expected in start() or tick()");
     return *host;
   }
 };
@@ -395,7 +399,8 @@ py::dict facts_of(const Setup& setup) {
 class PythonPlanner final : public planning::Planner {
  public:
   static constexpr std::uint32_t properties = HAMELIN_TICK_ALLOCATES | HAMELIN_FOLLOWS_TARGETS |
-                                              HAMELIN_FOLLOWS_PATHS | HAMELIN_FOLLOWS_TRAJECTORIES;
+                                              HAMELIN_FOLLOWS_PATHS | HAMELIN_FOLLOWS_TRAJECTORIES |
+                                              HAMELIN_ASKS_FOR_PATHS;
 
   PythonPlanner(const Host& host, const Setup& setup, const Json& params)
       : host_(host), query_(host), dof_(static_cast<std::size_t>(setup.dof())) {
@@ -586,8 +591,9 @@ void add_tick(py::module_& module) {
           "Joint velocities, shape (n,) [rad/s or m/s], as q.")
       .def_property_readonly(
           "goal", [](const PyTick& t) { return goal_dict(t.get().goal(), t.dof); },
-          "The current goal as a dict: type, tolerances, and q, path or position_m,\n"
-          "quaternion_wxyz, velocity_m_s, angular_velocity_rad_s; a copy.")
+          "The current goal as a dict: type, tolerances, path, path_search (\"not sought\",\n"
+          "\"sought\", \"found\", \"not found\"), and q or position_m, quaternion_wxyz,\n"
+          "velocity_m_s, angular_velocity_rad_s; a copy.")
       .def_property_readonly(
           "goal_number", [](const PyTick& t) { return t.get().goal_number(); },
           "Another number means another goal.")
@@ -712,8 +718,8 @@ void add_setup(py::module_& module) {
       module, "PlannerSetup",
       "What is fixed for a run, and the services of the host. A planner gets it by\n"
       "start(setup). Limits are None where the scene does not model them. The\n"
-      "queries may be used until the run ends; log(), warn(), declare_series() and draw_path() in\n"
-      "calls of the planner.")
+      "queries may be used until the run ends; log(), warn(), declare_series(), draw_path() and\n"
+      "request_path() in calls of the planner.")
       .def_property_readonly(
           "model", [](const PySetup& s) { return s.model; }, "The planner's model of the arm.")
       .def_property_readonly(
@@ -749,6 +755,11 @@ void add_setup(py::module_& module) {
           "for Command.set_series().")
       .def("draw_path", &setup_draw_path, arg("points"),
            "Draws a line of points of the world, shape (N, 3) [m], for log and report; in tick().")
+      .def(
+          "request_path", [](const PySetup& s) { return s.services().request_path(); },
+          "Asks for a collision-free path to the current goal; in tick(). Returns whether one will\n"
+          "be searched. Later ticks have another goal: at first one where the arm waits, then one\n"
+          "with the path, or the goal itself if none was found; goal[\"path_search\"] says which.")
       .def("clearance", &setup_clearance, arg("q"), py::kw_only(), arg("time_ahead") = 0.0,
            arg("at_least") = -1.0e9,
            "Smallest distance at q, shape (n,) or (N, n), from obstacles and of the arm from "

@@ -240,12 +240,47 @@ def test_views_outlive_their_calls(free_scene):
         lambda: setups[0].motion_clear(np.zeros(7), np.zeros(7)),
         lambda: setups[0].refresh(),
         lambda: setups[0].draw_path(np.zeros((2, 3))),
+        lambda: setups[0].request_path(),
         lambda: setups[0].declare_series("x"),
     ):
         with pytest.raises(hamelin.Error):
             use()
     with pytest.raises(ValueError):
         q[0] = 1.0
+
+
+def test_a_planner_asks_for_a_path(free_scene):
+    seen = []
+
+    class Mine:
+        def start(self, setup):
+            self.setup = setup
+
+        def tick(self, tick, command):
+            goal = tick.goal
+            if goal["path_search"] == "not sought":
+                assert "path" not in goal
+                assert self.setup.request_path()
+            if not seen or seen[-1][0] != goal["path_search"]:
+                seen.append((goal["path_search"], goal, tick.q))
+            command.held_torque = self.setup.model.gravity_torque(tick.q)
+            command.damping[:] = 10.0
+
+    hamelin.run(free_scene, planner=Mine(), duration=0.3)
+    assert [state for state, _, _ in seen] == ["not sought", "sought", "found"]
+    assert np.abs(seen[1][1]["q"] - seen[1][2]).max() < 1e-6  # the arm holds its place
+    _, goal, q = seen[2]
+    assert goal["type"] == "joint"
+    assert goal["path"].shape[0] >= 2
+    assert np.abs(goal["path"][0] - q).max() < 1e-3
+    assert np.array_equal(goal["path"][-1], goal["q"])
+
+    class Refused(Mine):
+        def tick(self, tick, command):
+            assert not self.setup.request_path()
+            command.held_torque = self.setup.model.gravity_torque(tick.q)
+
+    hamelin.run(free_scene, planner=Refused(), duration=0.01, guide="none")
 
 
 def test_services_belong_to_the_thread_of_a_call(free_scene):

@@ -51,7 +51,7 @@ Json full_document() {
     ],
     "model": {"joint_damping": [0.1, 0.2], "joint_limits": true, "torque_limits": false, "payload": {"mass_kg": 0.5, "inertia_kg_m2": [1, 2, 3, 0.1, 0.2, 0.3]}},
     "actuation": {"type": "sampled", "control_period_s": 0.002, "delay_s": 0.001, "joint_noise_rad": 1e-4, "planner_mass_scale": 1.1},
-    "planner": {"name": "hybrid", "params": {"escape": "tree"}},
+    "planner": {"name": "hybrid", "params": {"escape": "none"}},
     "integrator": {"name": "hamel-variational", "params": {"tolerance": 1e-12}},
     "stall": {"hold_s": 2},
     "step_s": 0.001, "duration_s": 30, "seed": 9007199254740991
@@ -133,7 +133,7 @@ TEST_CASE("a full scene is read field by field", "[scene][unit]") {
   CHECK(scene.actuation.type == ActuationType::sampled);
   CHECK(scene.actuation.control_period_s == 0.002);
   CHECK(scene.actuation.planner_mass_scale == 1.1);
-  CHECK(scene.planner->params["escape"] == "tree");
+  CHECK(scene.planner->params["escape"] == "none");
   CHECK(scene.integrator.params["tolerance"] == 1e-12);
   CHECK(scene.stall->hold_s == 2.0);
   CHECK(scene.stall->distance_m == 0.2);

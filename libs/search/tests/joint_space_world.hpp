@@ -22,13 +22,11 @@ class JointSpaceWorld final : public search::Query {
     ++checks_;
     return distance(q, q);
   }
-  bool posture_clear(const Eigen::VectorXd& q, double margin_m) override {
+  void set_margins(const search::Margins& margins) override { margins_ = margins; }
+  // Proves a motion as a whole, or its halves where the margins vary.
+  bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) override {
     ++checks_;
-    return distance(q, q) >= margin_m;
-  }
-  bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b, double margin_m) override {
-    ++checks_;
-    return distance(a, b) > margin_m;
+    return clear(a, b);
   }
   [[nodiscard]] long checks() const override { return checks_; }
 
@@ -46,6 +44,15 @@ class JointSpaceWorld final : public search::Query {
   }
 
  private:
+  bool clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+    const double least = margins_.least(a, b),
+                 most = std::max(margins_.required(a), margins_.required(b));
+    if (most - least < 1e-4 || (b - a).norm() < 0.1) return distance(a, b) > least;
+    const Eigen::VectorXd middle = 0.5 * (a + b);
+    return clear(a, middle) && clear(middle, b);
+  }
+
+  search::Margins margins_{0.0};
   std::vector<Ball> balls_;
   long checks_ = 0;
 };

@@ -134,8 +134,7 @@ void PlanScenes::add_sphere_on_path(const fs::path& file, const scene::ProblemOp
                                     Labels labels) {
   const SphereOnPath& sphere_options = *options_.sphere_on_path;
   scene::make_scene_from_problem(file, problem);
-  const PathWithSphere found =
-      place_sphere_on_path(problem.output, sphere_options, options_.plugin_directories);
+  const PathWithSphere found = place_sphere_on_path(problem.output, sphere_options);
   Json document = read_json(problem.output);
   fs::remove(problem.output);
   if (!found.reason.empty()) {

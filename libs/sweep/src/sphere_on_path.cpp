@@ -4,13 +4,14 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <optional>
 
+#include "hamelin/control/plan_paths.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/io/file.hpp"
-#include "hamelin/simulation/run.hpp"
 #include "hamelin/sweep/judge.hpp"
 
 namespace hamelin::sweep {
@@ -113,6 +114,19 @@ std::optional<Vector3d> swing_direction(const JudgedArm& arm, const std::vector<
   return best;
 }
 
+// Many configurations along a polyline.
+std::vector<VectorXd> nodes_on(const Eigen::MatrixXd& points) {
+  constexpr double step_rad = 0.005;
+  std::vector<VectorXd> nodes;
+  for (Eigen::Index i = 0; i + 1 < points.cols(); ++i) {
+    const VectorXd line = points.col(i + 1) - points.col(i);
+    const double steps = std::ceil(line.lpNorm<Eigen::Infinity>() / step_rad);
+    for (double k = 0.0; k < steps; ++k) nodes.emplace_back(points.col(i) + k / steps * line);
+  }
+  nodes.emplace_back(points.rightCols(1));
+  return nodes;
+}
+
 }  // namespace
 
 // docs/theory.md (13.26)
@@ -129,26 +143,21 @@ std::vector<VectorXd> thin_path(const std::vector<VectorXd>& nodes, double spaci
 }
 
 PathWithSphere place_sphere_on_path(const std::filesystem::path& scene_file,
-                                    const SphereOnPath& options,
-                                    const std::vector<std::filesystem::path>& plugin_directories) {
+                                    const SphereOnPath& options) {
   scene::Scene scene = scene::read_scene(scene_file);
   PathWithSphere found;
   if (const auto feasible = feasibility(scene, {}); !feasible.feasible) {
     found.reason = feasible.reason;
     return found;
   }
-  scene.planner = scene::Choice{"hybrid", {{"escape", "tree"}}};
+  scene.guide.type = scene::GuideType::rrt_connect;
   scene.seed = options.seed;
-  std::vector<VectorXd> nodes;
-  simulation::Watch watch;
-  watch.at_node = [&nodes](double, const VectorXd& q) { nodes.push_back(q); };
-  const log::Result result = simulation::run(scene, plugin_directories, watch);
-  if (result.outcome != log::Outcome::reached) {
-    found.reason = fmt::format("hybrid finds no path: {}{}", log::to_string(result.outcome),
-                               result.cause.empty() ? "" : ", " + result.cause);
+  const control::PathPlan plan = control::plan_paths(scene);
+  if (!plan.found()) {
+    found.reason = "no path: " + plan.goals.back().path.cause;
     return found;
   }
-  nodes.push_back(scene.goals.front().q);
+  const auto nodes = nodes_on(plan.goals.front().path.points);
   found.path = thin_path(nodes, options.spacing_rad);
   const JudgedArm arm(scene);
   Rng rng = random_of(options.seed, scene_file.stem().string());

@@ -22,15 +22,14 @@ struct PathWithSphere {
 [[nodiscard]] std::vector<Eigen::VectorXd> thin_path(const std::vector<Eigen::VectorXd>& nodes,
                                                      double spacing);
 
-/// Runs a scene with one joint goal by hybrid, thins its motion, and searches a position for a
-/// sphere on it. Candidates are the centres of the arm's moving balls, from the middle of the path
+/// Searches a path of a scene with one joint goal, thins it, and searches a position for a sphere
+/// on it. Candidates are the centres of the arm's moving balls, from the middle of the path
 /// outwards, with the balls in an order that depends on the seed and the name of the scene. The
 /// first candidate is taken that keeps the clearance of start and goal. A sphere swings at right
 /// angles to the way of its ball, in a random direction in which it stays away from the base and
 /// the first two links, which could not evade it.
-/// @throws Error as simulation::run
-[[nodiscard]] PathWithSphere place_sphere_on_path(
-    const std::filesystem::path& scene_file, const SphereOnPath& options,
-    const std::vector<std::filesystem::path>& plugin_directories);
+/// @throws Error as control::plan_paths
+[[nodiscard]] PathWithSphere place_sphere_on_path(const std::filesystem::path& scene_file,
+                                                  const SphereOnPath& options);
 
 }  // namespace hamelin::sweep

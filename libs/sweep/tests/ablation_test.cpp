@@ -30,8 +30,9 @@ TEST_CASE("a boolean is negated, a number becomes 0, and others get their value"
   // the value as given is negated, replaced, or kept beside the part
   CHECK(made("apf:gravity_compensation=false", "gravity_compensation").without ==
         "apf:gravity_compensation=true");
-  CHECK(made("hybrid+rrt-connect:repulsion_speed_m_s=3,escape=memory", "repulsion_speed_m_s")
-            .without == "hybrid+rrt-connect:escape=memory,repulsion_speed_m_s=0");
+  CHECK(
+      made("hybrid+rrt-connect:repulsion_speed_m_s=3,escape=none", "repulsion_speed_m_s").without ==
+      "hybrid+rrt-connect:escape=none,repulsion_speed_m_s=0");
   const Ablation named = made("hybrid", "escape=none");
   CHECK(named.without == "hybrid:escape=none");
   CHECK(named.value == "none");

@@ -1,7 +1,6 @@
 #pragma once
 #include <Eigen/Core>
 #include <algorithm>
-#include <limits>
 #include <vector>
 
 namespace hamelin::hybrid {
@@ -31,13 +30,6 @@ class JointPath {
     const double segment = empty() ? 0.0 : (points_.col(size()) - points_.col(size() - 1)).norm();
     arc_lengths_.push_back(length() + segment);
   }
-  /// Keeps only the first n points.
-  void keep(Eigen::Index n) { arc_lengths_.resize(to_size(std::min(n, size()))); }
-  void reverse() {
-    const auto n = size();
-    for (Eigen::Index i = 0; i < n / 2; ++i) points_.col(i).swap(points_.col(n - 1 - i));
-    measure(n);
-  }
   /// The point at arc length s.
   void at(double s, Eigen::VectorXd& out) const {
     const auto next = std::upper_bound(arc_lengths_.begin(), arc_lengths_.end(), s);
@@ -65,49 +57,9 @@ class JointPath {
     }
     return s;
   }
-  /// The arc length between s and s + range at which the path is nearest to q.
-  [[nodiscard]] double nearest(double s, double range, const Eigen::VectorXd& q,
-                               Eigen::VectorXd& scratch) const {
-    constexpr double step = 0.02;
-    double best = s, least = std::numeric_limits<double>::infinity();
-    for (double arc_length = s; arc_length <= std::min(s + range, length()); arc_length += step) {
-      at(arc_length, scratch);
-      if (const double distance = (scratch - q).squaredNorm(); distance < least)
-        least = distance, best = arc_length;
-    }
-    return best;
-  }
-  /// Replaces the stretch between the arc lengths a < b by a straight line.
-  void cut(double a, double b, Eigen::VectorXd& from, Eigen::VectorXd& to) {
-    at(a, from);
-    at(b, to);
-    const auto begin = arc_lengths_.begin(), stop = arc_lengths_.end();
-    const auto first = std::upper_bound(begin, stop, a) - begin;  // first point past a
-    const auto last = std::lower_bound(begin, stop, b) - begin;   // first point not before b
-    const auto n = size(), grown = n - (last - first) + 2;
-    if (grown > capacity()) return;
-    const auto tail = n - last;
-    if (first + 2 <= last) {
-      for (Eigen::Index i = 0; i < tail; ++i) points_.col(first + 2 + i) = points_.col(last + i);
-    } else {
-      for (Eigen::Index i = tail - 1; i >= 0; --i)
-        points_.col(first + 2 + i) = points_.col(last + i);
-    }
-    points_.col(first) = from;
-    points_.col(first + 1) = to;
-    measure(grown);
-  }
 
  private:
   static std::size_t to_size(Eigen::Index n) { return static_cast<std::size_t>(n); }
-  void measure(Eigen::Index n) {
-    arc_lengths_.clear();
-    double s = 0.0;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      if (i > 0) s += (points_.col(i) - points_.col(i - 1)).norm();
-      arc_lengths_.push_back(s);
-    }
-  }
 
   Eigen::MatrixXd points_;  ///< one column per point
   std::vector<double> arc_lengths_;

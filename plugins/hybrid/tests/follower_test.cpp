@@ -3,9 +3,9 @@
 #include <random>
 
 #include "../src/follower.hpp"
-#include "fixture.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/test/allocations.hpp"
+#include "hamelin/test/reactive_scene.hpp"
 
 using namespace hamelin;
 using Eigen::Vector3d;
@@ -124,7 +124,7 @@ TEST_CASE("a stretched arm bends for a target that comes back", "[hybrid][follow
   test::Task task = test::tip_task({0.9, 0.0, 0.0});
   task.joint_limit = 2.0;
   task.goal.type = HAMELIN_GOAL_FOLLOW;
-  test::Scene scene(task);
+  test::ReactiveScene scene(task);
   const VectorXd straight = VectorXd::Zero(4);
   Follower follower(scene.setup, scene.model);
   follower.set_params({8.0, 0.5, 1.5, 3.0, 0.02, 0.15});

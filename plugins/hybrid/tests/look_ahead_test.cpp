@@ -2,9 +2,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "fixture.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/random_mass.hpp"
+#include "hamelin/test/reactive_scene.hpp"
 
 using namespace hamelin;
 using Eigen::MatrixXd;
@@ -76,7 +76,7 @@ struct Looks {
   }
 
   std::size_t moving_count = 1;
-  test::Scene scene;
+  test::ReactiveScene scene;
   hybrid::Law law;
   LookAhead look;
   Trail trail;

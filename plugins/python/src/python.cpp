@@ -192,7 +192,7 @@ hamelin_plugin make_plugin() noexcept {
   plugin.abi_version = HAMELIN_PLUGIN_ABI_VERSION;
   plugin.abi_version_min = HAMELIN_PLUGIN_ABI_VERSION_MIN;
   plugin.properties = HAMELIN_TICK_ALLOCATES | HAMELIN_FOLLOWS_TARGETS | HAMELIN_FOLLOWS_PATHS |
-                      HAMELIN_FOLLOWS_TRAJECTORIES;
+                      HAMELIN_FOLLOWS_TRAJECTORIES | HAMELIN_ASKS_FOR_PATHS;
   plugin.name = "python";
   plugin.version = HAMELIN_VERSION;
   plugin.description = "a planner that is written in Python: --planner python:FILE:CLASS";

@@ -504,7 +504,7 @@ TEST_CASE("a tick of hybrid does not allocate while it searches", "[simulation][
   REQUIRE(held.outcome == Outcome::stalled);
   const auto allocations = [&](double duration_s) {
     return test::allocations_in([&] {
-      const auto result = run("tree", duration_s);
+      const auto result = run("search", duration_s);
       CHECK(result.outcome == Outcome::timeout);
     });
   };

@@ -45,22 +45,34 @@ const std::string connect = "/planner/guide=rrt-connect";
 
 }  // namespace
 
-TEST_CASE("a guided planner without an escape reaches all goals, clear and certified",
+TEST_CASE("planners reach all goals on searched paths, clear and certified",
           "[closed_loop][guide]") {
-  const auto guide = GENERATE(as<std::string>{}, "rrt", "rrt-connect", "rrt-star", "bit-star",
-                              "informed-rrt-star");
-  CAPTURE(guide);
-  const log::Result result = run({"/planner/guide=" + guide, "/planner/params/escape=none",
-                                  "/duration_s=60", "/planner/guide_options/improve_checks=2000"});
+  const auto planner = GENERATE(as<std::string>{}, "hybrid", "mppi", "apf");
+  CAPTURE(planner);
+  // one asks for paths, the other is given its way-points
+  const std::string type = planner == "apf" ? "rrt-connect" : "on-request";
+  const log::Result result = run(
+      {R"(/planner={"name": ")" + planner + R"("})", "/planner/guide=" + type, "/duration_s=60"});
   CHECK(result.outcome == log::Outcome::reached);
   CHECK(*result.min_clearance_m > 0.0);
   CHECK(result.certified_share == 1.0);
   REQUIRE(result.guide);
-  CHECK(result.guide->type == guide);
+  CHECK(result.guide->type == type);
   CHECK(result.guide->searches >= 5);  // one per goal
   CHECK(result.guide->found == result.guide->searches);
   CHECK(result.guide->kept == 0);
   CHECK(*result.guide->length > 0.0);
+}
+
+TEST_CASE("who asks for paths gets none where the scene has no guide", "[closed_loop][guide]") {
+  const log::Result result = run({"/planner/guide=none", "/duration_s=1"});
+  CHECK_FALSE(result.guide);
+}
+
+TEST_CASE("a planner that is to escape by itself asks for no paths", "[closed_loop][guide]") {
+  const log::Result result = run({"/planner/params/escape=none", "/duration_s=1"});
+  REQUIRE(result.guide);
+  CHECK(result.guide->searches == 0);
 }
 
 TEST_CASE("guided runs repeat themselves to the byte", "[closed_loop][guide]") {
@@ -114,7 +126,7 @@ TEST_CASE("plans have a certificate for each line and chain from goal to goal",
   }
   const Json again = control::to_json(control::plan_paths(shelf({connect})));
   CHECK(again["paths"][0]["q"] == document["paths"][0]["q"]);
-  CHECK(test::error_of([] { (void)control::plan_paths(shelf({})); })
+  CHECK(test::error_of([] { (void)control::plan_paths(shelf({"/planner/guide=none"})); })
             .ends_with("shelf.json: /planner/guide: is none, expected a guide such as "
                        "rrt-connect"));
 }

@@ -62,14 +62,13 @@ TEST_CASE("an arm whose path is barred turns past what bars it, without a search
           "[hybrid][closed_loop]") {
   const bool steering = GENERATE(false, true);
   const auto result = run(
-      "shelf.json",
-      {"/map=null", "/start/q=[-0.8, -0.4, 0, -2.0, 0, 1.571, 0.785]",
-       R"(/goals=[{"type": "path", "q": [[0, -0.4, 0, -2.0, 0, 1.571, 0.785],
+      "shelf.json", {"/map=null", "/start/q=[-0.8, -0.4, 0, -2.0, 0, 1.571, 0.785]",
+                     R"(/goals=[{"type": "path", "q": [[0, -0.4, 0, -2.0, 0, 1.571, 0.785],
                                           [0.8, -0.4, 0, -2.0, 0, 1.571, 0.785]]}])",
-       R"(/obstacles=[{"name": "post", "type": "sphere", "radius_m": 0.1,
+                     R"(/obstacles=[{"name": "post", "type": "sphere", "radius_m": 0.1,
                        "position_m": [0.45, 0, 0.55]}])",
-       R"(/planner={"name": "hybrid", "params": {"escape": "none", "steering": )" +
-           std::string(steering ? "true" : "false") + "}}"});
+                     R"(/planner={"name": "hybrid", "params": {"escape": "none", "steering": )" +
+                         std::string(steering ? "true" : "false") + "}}"});
   CAPTURE(result.cause);
   CHECK((result.outcome == log::Outcome::reached) == steering);
   CHECK(*result.min_clearance_m > 0.0);

@@ -260,20 +260,3 @@ TEST_CASE("a tick does not allocate while the arm evades", "[simulation][allocat
     CHECK(after == before);
   }
 }
-
-TEST_CASE("search_steps shortens the time for which the arm waits for a search",
-          "[hybrid][closed_loop]") {
-  // A ball between start and goal, around which the arm has to fold.
-  const auto time_of = [](int steps) {
-    const TemporaryFolder folder;
-    Json document = test::scene_52();
-    document["start"] = {{"q", {-0.9, 0.0, 0.0, 0.0}}};
-    document["goals"] = {{{"type", "joint"}, {"q", {0.9, 0.0, 0.0, 0.0}}}};
-    document["obstacles"] = Json::array({test::ball("between", 3.0, 0.0, 0.4)});
-    document["planner"] = {{"name", "hybrid"}, {"params", {{"search_steps", steps}}}};
-    const auto result = test::run_scene(folder, document);
-    REQUIRE(result.outcome == Outcome::reached);
-    return result.time_s;
-  };
-  CHECK(time_of(1) > time_of(10));
-}

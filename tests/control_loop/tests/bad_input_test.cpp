@@ -87,7 +87,7 @@ std::vector<BadUpdate> bad_updates(const scene::Scene& scene, const std::filesys
        }},
       {"/escape: cannot be changed while it runs",
        [](auto& c) {
-         c.set_planner_params({{"escape", "memory"}});
+         c.set_planner_params({{"escape", "none"}});
        }},
   };
 }

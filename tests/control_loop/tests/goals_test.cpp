@@ -182,9 +182,9 @@ TEST_CASE("parameters that cannot be changed are refused with the reason and cha
   CHECK(set(Json::array()) == "parameters of planner 'hybrid': /: expected an object");
   CHECK_THAT(set({{"cruise_speed", -1}}), Catch::Contains("/cruise_speed: -1 is not allowed"));
   CHECK_THAT(set({{"cruise_sped", 1}}), Catch::Contains("unknown key 'cruise_sped'"));
-  CHECK(set({{"escape", "memory"}}) ==
+  CHECK(set({{"escape", "none"}}) ==
         "parameters of planner 'hybrid': /escape: cannot be changed while it runs, expected "
-        "\"tree\"");
+        "\"search\"");
   CHECK(loop.controller.planner_params() == before);
   loop.controller.set_planner_params({{"margin_m", 0.05}});
   CHECK(loop.controller.planner_params().at("margin_m") == 0.05);

@@ -87,7 +87,7 @@ TEST_CASE("planners are compared with themselves without a part", "[end_to_end]"
                         "--family",      "shelf,pillars",
                         "--per-family",  "1",
                         "--planner",     "hybrid",
-                        "--planner",     "hybrid:escape=memory",
+                        "--planner",     "hybrid:escape=none",
                         "--ablate",      "repulsion_speed_m_s",
                         "--duration",    "3",
                         "--expect-gain", "-o",
@@ -96,10 +96,10 @@ TEST_CASE("planners are compared with themselves without a part", "[end_to_end]"
   CAPTURE(output.err);
   REQUIRE(output.exit_code == 0);
   CHECK_THAT(line_of(output.out, "family"),
-             Catch::EndsWith("hybrid  hybrid:repulsion_speed_m_s=0  hybrid:escape=memory  "
-                             "hybrid:escape=memory,repulsion_speed_m_s=0"));
+             Catch::EndsWith("hybrid  hybrid:repulsion_speed_m_s=0  hybrid:escape=none  "
+                             "hybrid:escape=none,repulsion_speed_m_s=0"));
   CHECK_THAT(line_of(output.out, "ablation"), Catch::Contains("only with  only without"));
-  CHECK_THAT(line_of(output.out, "hybrid:escape=memory,repulsion_speed_m_s=0"),
+  CHECK_THAT(line_of(output.out, "hybrid:escape=none,repulsion_speed_m_s=0"),
              Catch::Contains("/2"));
   const auto checked = sandbox.run({"validate", "parts/benchmark.json", "parts/plan.json"});
   CAPTURE(checked.err);
@@ -108,7 +108,7 @@ TEST_CASE("planners are compared with themselves without a part", "[end_to_end]"
   CHECK(results["planners"].size() == 4);
   REQUIRE(results["ablations"].size() == 2);
   CHECK(results["ablations"][0]["planner"] == "hybrid");
-  CHECK(results["ablations"][1]["without"] == "hybrid:escape=memory,repulsion_speed_m_s=0");
+  CHECK(results["ablations"][1]["without"] == "hybrid:escape=none,repulsion_speed_m_s=0");
   for (const auto& ablation : results["ablations"]) {
     CHECK(ablation["value"] == 0);
     CHECK(ablation["pairs"] == 2);

@@ -16,7 +16,7 @@ class Margins {
   };
 
   /// @param full_m away from tight places
-  /// @param weights of the joints in distances between configurations, docs/theory.md (17.0); of
+  /// @param weights of the joints in distances between configurations, docs/theory.md (17.16); of
   ///        size zero: ones
   explicit Margins(double full_m, Eigen::VectorXd weights = {})
       : full_(full_m), weights_(std::move(weights)) {}

@@ -8,7 +8,8 @@
 
 #include "hamelin/geometry/se3.hpp"
 #include "hamelin/planning/plugin_host.hpp"
-#include "hamelin/reactive/rollout.hpp"
+#include "hamelin/reactive/margins.hpp"
+#include "hamelin/reactive/surroundings.hpp"
 #include "hamelin/scene/obstacles.hpp"
 #include "hamelin/test/arm_loop.hpp"
 
@@ -89,11 +90,9 @@ class ReactiveScene {
         raw_setup_(data_.view()),
         raw_host_(host()),
         setup(raw_setup_),
-        surroundings(planning::Host(raw_host_), setup, model),
-        margins(setup, margin_params),
-        rollout(setup, model, law_params, margins, surroundings) {
+        surroundings(planning::Host(raw_host_), setup),
+        margins(setup, margin_params) {
     margins.set_goal(surroundings, goal(), contact_radius);
-    rollout.set_goal(goal());
   }
   ReactiveScene(const ReactiveScene&) = delete;
   ReactiveScene& operator=(const ReactiveScene&) = delete;
@@ -283,7 +282,6 @@ class ReactiveScene {
   const planning::Setup setup;
   reactive::Surroundings surroundings;
   reactive::Margins margins;
-  reactive::Rollout rollout;
 };
 
 /// A ball that is at a place at time 0 and keeps its velocity.
