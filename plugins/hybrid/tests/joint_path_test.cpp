@@ -28,11 +28,6 @@ VectorXd at(const JointPath& path, double s) {
   return q;
 }
 
-// Not inlined: GCC 12 otherwise warns of an overflow in a growth that cannot happen.
-[[gnu::noinline]] void keep(JointPath& path, Eigen::Index n) {
-  path.keep(n);
-}
-
 // Checks the points of the path, also by their arc lengths.
 void check_points(const JointPath& path, const std::vector<Vector2d>& expected) {
   REQUIRE(path.size() == static_cast<Eigen::Index>(expected.size()));
@@ -80,19 +75,6 @@ TEST_CASE("a path accepts no more points than its capacity", "[hybrid][joint_pat
   CHECK(path.size() == 4);
   CHECK(path.length() == 6.0);
   CHECK(path.end() == Vector2d(-2.0, 2.0));
-}
-
-TEST_CASE("keeping the first points shortens a path", "[hybrid][joint_path]") {
-  JointPath path = hook();
-  keep(path, 9);
-  CHECK(path.size() == 4);
-  keep(path, 2);
-  check_points(path, {{0.0, 0.0}, {1.0, 0.0}});
-  path.add(Vector2d(1.0, 1.0));
-  check_points(path, {{0.0, 0.0}, {1.0, 0.0}, {1.0, 1.0}});
-  keep(path, 0);
-  CHECK(path.empty());
-  CHECK(path.length() == 0.0);
 }
 
 TEST_CASE("the carrot moves ahead on the path and never back", "[hybrid][joint_path]") {

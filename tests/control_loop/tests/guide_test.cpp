@@ -130,6 +130,40 @@ TEST_CASE("new goals, a new start and a load begin with a search of their own",
   CHECK(loop.controller.guide_figures()->searches == 1);  // since the new start
 }
 
+TEST_CASE("a planner asks for a path at each goal, as often as the scene allows",
+          "[control][guide]") {
+  control::Controller::Options options;
+  options.guide_thread = false;
+  scene::Scene scene = guided_scene();
+  scene.guide.type = scene::GuideType::on_request;
+  Loop loop(scene, options);
+  const control::GuideFigures& figures = *loop.controller.guide_figures();
+  const auto ticks = [&](int count, bool search) {
+    for (int k = 0; k < count; ++k) {
+      loop.step(loop.tick().torque);
+      if (search) loop.controller.run_guide();
+    }
+  };
+  const VectorXd start = loop.state.q;
+  ticks(100, false);
+  CHECK(figures.waited_s == Approx(0.099));  // it asks in the first tick
+  CHECK((loop.state.q - start).lpNorm<Eigen::Infinity>() < 1e-3);
+  ticks(300, true);
+  CHECK(figures.searches == 1);
+  CHECK(figures.found == 1);
+  loop.controller.set_goal(scene::joint_goal(loop.state.q + VectorXd::Constant(7, 0.1)));
+  ticks(50, true);
+  CHECK(figures.searches == 2);
+  scene.guide.type = scene::GuideType::none;
+  Loop alone(scene, options);
+  CHECK(alone.controller.guide_figures() == nullptr);
+  CHECK(alone.tick().state == control::ControlState::running);
+  scene.guide.type = scene::GuideType::on_request;
+  Loop reactive(scene, options, no_escape);
+  for (int k = 0; k < 100; ++k) reactive.step(reactive.tick().torque);
+  CHECK(reactive.controller.guide_figures()->waited_s == 0.0);
+}
+
 TEST_CASE("planners that follow no paths are shown their way-points", "[control][guide]") {
   const scene::GuideSpec spec{scene::GuideType::rrt_connect, {}, 1000, 0, 1, 0.0};
   CHECK(planning::find_plugin("hybrid", {HAMELIN_TEST_PLUGIN_DIR}).follows_paths());
@@ -147,8 +181,8 @@ TEST_CASE("planners that follow no paths are shown their way-points", "[control]
     control::Guidance guidance(spec, loop.arm.dof(), 64, follows, false);
     VectorXd q = scene.start_q;
     const auto update = [&](double time_s) {
-      const auto news =
-          guidance.update({time_s, 0.001, q, scene.goals.front(), follows ? 1U : 2U, 0}, search);
+      const auto news = guidance.update(
+          {time_s, 0.001, q, scene.goals.front(), follows ? 1U : 2U, 0, nullptr}, search);
       search.run();
       return news;
     };
