@@ -18,13 +18,13 @@ namespace hamelin::test {
 inline const std::array<const char*, 2> c_plugins{HAMELIN_TEST_PLUGIN_DIR,
                                                   HAMELIN_TEST_ONLY_PLUGIN_DIR};
 
-/// The scene clutter.json with one torque per millisecond, for any folder.
+/// The scene clutter.json with one torque per millisecond, for any folder, without searched paths.
 inline Json c_document(const std::string& planner, const Json& params = Json::object()) {
   Json document = parse_json(read_file(data_folder / "scenes/clutter.json"), "clutter.json");
   document["robot"]["file"] = (data_folder / "robots/arm7.urdf").string();
   document["robot"]["spheres"] = (data_folder / "robots/arm7.spheres.json").string();
   document["map"]["file"] = (data_folder / "maps/clutter.bt").string();
-  document["planner"] = {{"name", planner}, {"params", params}};
+  document["planner"] = {{"name", planner}, {"params", params}, {"guide", "none"}};
   document["actuation"] = {{"type", "sampled"}, {"control_period_s", 0.001}, {"deadline_s", 0.001}};
   return document;
 }

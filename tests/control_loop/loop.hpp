@@ -19,11 +19,13 @@ namespace hamelin::test {
 inline constexpr double not_finite = std::numeric_limits<double>::quiet_NaN();
 inline const std::filesystem::path data_folder = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data";
 
-/// A scene of data/, controlled by one torque per millisecond as a robot is.
+/// A scene of data/, controlled by one torque per millisecond as a robot is. No paths are searched,
+/// which a thread does in its own time.
 inline scene::Scene sampled(const std::string& name) {
   scene::Scene scene = scene::read_scene(data_folder / "scenes" / name);
   scene.actuation.type = scene::ActuationType::sampled;
   scene.actuation.control_period_s = scene.step_s = 0.001;
+  scene.guide.type = scene::GuideType::none;
   return scene;
 }
 

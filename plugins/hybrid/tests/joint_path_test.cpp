@@ -28,19 +28,6 @@ VectorXd at(const JointPath& path, double s) {
   return q;
 }
 
-// Checks the points of the path, also by their arc lengths.
-void check_points(const JointPath& path, const std::vector<Vector2d>& expected) {
-  REQUIRE(path.size() == static_cast<Eigen::Index>(expected.size()));
-  double s = 0.0;
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    CHECK(path.point(k).isApprox(expected[i], 1e-15));
-    if (i > 0) s += (expected[i] - expected[i - 1]).norm();
-    CHECK((at(path, s) - expected[i]).norm() < 1e-12);
-  }
-  CHECK(path.length() == Approx(s).margin(1e-15));
-}
-
 }  // namespace
 
 TEST_CASE("a path is parametrised by its arc length", "[hybrid][joint_path]") {
