@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "hamelin/core/error.hpp"
 
@@ -123,12 +124,41 @@ MapField::Changed Environment::apply(const MapChange& change) {
     if (field.use_count() > 1) field = std::make_shared<MapField>(*field);
     return *field;
   };
+  update_field(change);
   const MapField::Changed changed = own(map_).change(change.occupied, change.free);
   if (summary_.unknown != UnknownPolicy::free) {
     own(unknown_).change({}, change.free);
     own(unknown_).change({}, change.occupied);
   }
   return changed;
+}
+
+std::shared_ptr<const DistanceField> Environment::distance_field() const {
+  std::call_once(field_->once, [this] {
+    std::vector<VoxelBox> voxels;
+    const auto add = [&](const BoxField& boxes) {
+      for (std::size_t i = 0; i < boxes.boxes().size(); ++i)
+        if (boxes.alive(i)) voxels.push_back(to_voxels(boxes.boxes()[i], summary_.resolution_m));
+    };
+    add(map_->boxes());
+    if (summary_.unknown == UnknownPolicy::block) add(unknown_->boxes());
+    if (auto field = DistanceField::make(voxels, summary_.resolution_m))
+      field_->field = std::make_shared<DistanceField>(std::move(*field));
+    field_->made = true;
+  });
+  return field_->field;
+}
+
+void Environment::update_field(const MapChange& change) {
+  const std::shared_ptr<LazyField> before = std::exchange(field_, std::make_shared<LazyField>());
+  if (!before->made || !before->field) return;
+  // Another environment, or whoever asked for the field, may still use it.
+  const bool own = before.use_count() == 1 && before->field.use_count() == 1;
+  auto field = own ? before->field : std::make_shared<DistanceField>(*before->field);
+  std::call_once(field_->once, [&] {
+    if (field->change(change.free, change.occupied)) field_->field = std::move(field);
+    field_->made = true;
+  });
 }
 
 std::string Environment::advance(double time_s) {

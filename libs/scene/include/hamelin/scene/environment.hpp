@@ -1,10 +1,12 @@
 #pragma once
 #include <Eigen/Core>
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -12,6 +14,7 @@
 #include <vector>
 
 #include "hamelin/geometry/se3.hpp"
+#include "hamelin/scene/distance_field.hpp"
 #include "hamelin/scene/map_field.hpp"
 #include "hamelin/scene/map_region.hpp"
 #include "hamelin/scene/obstacles.hpp"
@@ -177,6 +180,14 @@ class Environment {
   /// allocate nor wait.
   void prepare() const;
 
+  /// Distances from the map, and from unknown space that blocks, at the corners of its voxels, in
+  /// the map's frame. Computed at the first call, and from then on updated with each change of the
+  /// map. Null if it would need more than DistanceField::bytes_max. Environments that share the map
+  /// share it.
+  [[nodiscard]] std::shared_ptr<const DistanceField> distance_field() const;
+  /// Computes now what the first call of distance_field() would compute.
+  void prepare_field() const { (void)distance_field(); }
+
   /// Whether an obstacle may ever move.
   [[nodiscard]] bool moves(std::size_t obstacle) const noexcept { return moves_[obstacle] != 0; }
   /// Whether any obstacle may ever move.
@@ -209,11 +220,21 @@ class Environment {
   /// Applies one change to fields that no other environment shares.
   MapField::Changed apply(const MapChange& change);
 
+  /// A distance field, once it is made.
+  struct LazyField {
+    std::once_flag once;
+    std::shared_ptr<DistanceField> field;
+    std::atomic<bool> made = false;
+  };
+  /// Replaces the distance field, if there is one, by one that knows a change.
+  void update_field(const MapChange& change);
+
   geometry::SE3 map_pose_, map_pose_inverse_;
   /// In the map's frame [m]. Copies of an environment share them until one of them is changed.
   std::shared_ptr<MapField> map_ = std::make_shared<MapField>(), unknown_ = map_;
-  std::optional<MapSpec> map_spec_;  ///< without its changes
-  Ball map_ball_;                    ///< what was kept of the map, in its frame
+  std::shared_ptr<LazyField> field_ = std::make_shared<LazyField>();  ///< shared as the map is
+  std::optional<MapSpec> map_spec_;                                   ///< without its changes
+  Ball map_ball_;  ///< what was kept of the map, in its frame
   std::vector<MapChange> changes_;
   std::size_t next_change_ = 0;
   /// Checks the obstacles, and takes them.

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
 namespace hamelin::search {
@@ -26,6 +27,9 @@ class Margins {
   void add(const Eigen::VectorXd& q, double margin_m, double near, double far);
   [[nodiscard]] double full_m() const noexcept { return full_; }
   [[nodiscard]] const Eigen::VectorXd& weights() const noexcept { return weights_; }
+  [[nodiscard]] double weight(Eigen::Index joint) const {
+    return weights_.size() > 0 ? weights_[joint] : 1.0;
+  }
   [[nodiscard]] const std::vector<Place>& places() const noexcept { return places_; }
   /// What a configuration must keep [m].
   [[nodiscard]] double required(const Eigen::VectorXd& q) const;
