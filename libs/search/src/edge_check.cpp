@@ -55,9 +55,9 @@ void EdgeCheck::place(const VectorXd& q, scene::PlacedShapes& arm) {
   ++checks_;
 }
 
-bool EdgeCheck::posture_clear(const VectorXd& q, double margin_m) {
+bool EdgeCheck::posture_clear(const VectorXd& q, double margin_m, std::span<const int> subjects) {
   place(q, last_);
-  return std::all_of(all_.begin(), all_.end(),
+  return std::all_of(subjects.begin(), subjects.end(),
                      [&](int subject) { return keeps_margin(subject, last_.view(), margin_m); });
 }
 
@@ -79,7 +79,8 @@ bool EdgeCheck::keeps_margin(int subject, const scene::Shapes& arm, double margi
                                  scene::View::judge, {}, scene::Among::moving) >= margin_m;
 }
 
-bool EdgeCheck::motion_clear(const VectorXd& a, const VectorXd& b, double margin_m) {
+bool EdgeCheck::motion_clear(const VectorXd& a, const VectorXd& b, double margin_m,
+                             std::span<const int> subjects) {
   start_ = a;
   dq_ = b - a;
   margin_ = margin_m + edge_rounding_m;
@@ -92,9 +93,9 @@ bool EdgeCheck::motion_clear(const VectorXd& a, const VectorXd& b, double margin
   way_.noalias() = levers_.shapes() * q_;
   pair_way_.noalias() = levers_.pairs() * q_;
   // The end first, because it is the likeliest to be in collision.
-  if (!posture_clear(b, margin_)) return false;
+  if (!posture_clear(b, margin_, subjects)) return false;
   place(a, first_);
-  return prove({0.0, 1.0, first_.view(), last_.view()}, all_, 0);
+  return prove({0.0, 1.0, first_.view(), last_.view()}, subjects, 0);
 }
 
 // docs/theory.md (17.2)–(17.4): a sphere strays from its chord, all else from the middle of the

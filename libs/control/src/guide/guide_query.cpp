@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-
 namespace hamelin::control {
 
 using Eigen::VectorXd;
@@ -22,13 +21,17 @@ constexpr double proved_to_m = 1e-4;
 }  // namespace
 
 GuideQuery::GuideQuery(const model::Model& model, const World& world, const WorldView& view)
-    : query_(model, world, view), edges_(model, view.self_field()), influence_(view.influence_m()) {
+    : query_(model, world, view),
+      lines_(model, view.self_field()),
+      edges_(model, view.self_field()),
+      influence_(view.influence_m()) {
   (void)refresh(0.0);
 }
 
 std::uint64_t GuideQuery::refresh(double time_s) {
   time_s_ = time_s;
   const std::uint64_t number = query_.refresh();
+  lines_.set_environment(query_.snapshot().environment, time_s);
   edges_.set_environment(query_.snapshot().environment, time_s);
   return number;
 }
@@ -39,31 +42,16 @@ double GuideQuery::clearance(const VectorXd& q, double at_least_m) {
   return query_.clearance(q.data(), time_s_, at_least_m);
 }
 
-// Near tight places, where the margins vary, a motion is divided into pieces with a margin each.
-bool GuideQuery::motion_clear(const VectorXd& a, const VectorXd& b) {
-  constexpr double piece = 0.1, constant_m = 5e-4;
-  poll();
-  const double least = margins_.least(a, b);
-  const bool constant = std::max(margins_.required(a), margins_.required(b)) - least < constant_m;
-  if (constant || (b - a).norm() <= piece) return edges_.motion_clear(a, b, least);
-  // The half at b first: it is new to the caller, and likelier to be in collision.
-  const VectorXd middle = 0.5 * (a + b);
-  return motion_clear(middle, b) && motion_clear(a, middle);
-}
-
 double GuideQuery::proved_clearance(const VectorXd& a, const VectorXd& b) {
-  const long before = edges_.checks();
   double low = 0.0, high = std::min({influence_, query_.clearance(a.data(), time_s_, -1.0),
                                      query_.clearance(b.data(), time_s_, -1.0)});
   if (high <= 0.0 || !edges_.motion_clear(a, b, 0.0)) {
-    clearances_ -= edges_.checks() - before;
     return std::min(high, 0.0);
   }
   while (high - low > proved_to_m) {
     const double middle = 0.5 * (low + high);
     (edges_.motion_clear(a, b, middle) ? low : high) = middle;
   }
-  clearances_ -= edges_.checks() - before;
   return std::max(low, 1e-12);
 }
 

@@ -8,6 +8,7 @@
 #include "hamelin/control/world.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/search/edge_check.hpp"
+#include "hamelin/search/line_check.hpp"
 #include "hamelin/search/search.hpp"
 #include "world/world_query.hpp"
 
@@ -25,9 +26,12 @@ class GuideQuery final : public search::Query {
   std::uint64_t refresh(double time_s);
 
   [[nodiscard]] double clearance(const Eigen::VectorXd& q, double at_least_m) override;
-  void set_margins(const search::Margins& margins) override { margins_ = margins; }
-  [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) override;
-  [[nodiscard]] long checks() const override { return edges_.checks() + clearances_; }
+  void set_margins(const search::Margins& margins) override { lines_.set_margins(margins); }
+  [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) override {
+    poll();
+    return lines_.motion_clear(a, b);
+  }
+  [[nodiscard]] long checks() const override { return lines_.checks() + clearances_; }
 
   /// A function to be called now and then during searches. It may throw, which ends the search.
   void set_poll(std::function<void()> poll) { poll_ = std::move(poll); }
@@ -44,8 +48,8 @@ class GuideQuery final : public search::Query {
   }
 
   WorldQuery query_;
+  search::LineCheck lines_;
   search::EdgeCheck edges_;
-  search::Margins margins_{0.0};
   double influence_, time_s_ = 0.0;
   long clearances_ = 0, calls_ = 0;
   std::function<void()> poll_;

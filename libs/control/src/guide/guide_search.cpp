@@ -65,7 +65,8 @@ void GuideSearch::answer() {
   out->snapshot = query_.refresh(request_.time_s);
   out->kept = still_clear();
   try {
-    if (!out->kept) out->path = search_.search({request_.q, {request_.goal}, request_.search}, query_);
+    if (!out->kept)
+      out->path = search_.search({request_.q, {request_.goal}, request_.search}, query_);
   } catch (const std::exception& e) {  // on a thread of its own nobody could catch it
     out->path.cause = e.what();
   }

@@ -32,9 +32,18 @@ class EdgeCheck {
   /// Whether all distances are more than the margin on the line from a to b, ends included; false
   /// also if there is no proof.
   [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
-                                  double margin_m);
+                                  double margin_m) {
+    return motion_clear(a, b, margin_m, all_);
+  }
+  /// The same for some shapes and pairs of parts only.
+  /// @param subjects shapes by their index in Model::shapes(), pairs by their index in
+  ///        SelfField::pairs() plus the number of shapes
+  [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
+                                  double margin_m, std::span<const int> subjects);
   /// Whether all distances are at least the margin at q.
-  [[nodiscard]] bool posture_clear(const Eigen::VectorXd& q, double margin_m);
+  [[nodiscard]] bool posture_clear(const Eigen::VectorXd& q, double margin_m) {
+    return posture_clear(q, margin_m, all_);
+  }
   /// Postures at which the arm was placed since the start.
   [[nodiscard]] long checks() const noexcept { return checks_; }
 
@@ -50,6 +59,8 @@ class EdgeCheck {
     scene::Shapes from, to;
   };
   void place(const Eigen::VectorXd& q, scene::PlacedShapes& arm);
+  [[nodiscard]] bool posture_clear(const Eigen::VectorXd& q, double margin_m,
+                                   std::span<const int> subjects);
   /// Whether a shape or pair keeps the margin at a posture.
   [[nodiscard]] bool keeps_margin(int subject, const scene::Shapes& arm, double margin_m);
   /// @param subjects what is to be proved on the piece
