@@ -56,6 +56,7 @@ control::Controller::Options options_of_trial() {
   options.period_s = period_s;
   options.clock_s = control::steady_clock_s;
   options.late_answers_max = 0;  // late answers are a finding, no failure
+  options.guide_thread = false;  // threads are the planner's then
   return options;
 }
 
@@ -90,6 +91,7 @@ class Loop {
     }
     append(answers, answer);
     out.tick_s.push_back(answer.planner_s);
+    controller_.run_guide();
     step(answer.torque);
     return true;
   }

@@ -115,8 +115,8 @@ std::vector<MatrixXd> guide_paths(const scene::Scene& scene, const model::Model&
                                   control::World& world) {
   const control::PathPlan plan = control::plan_paths(scene, arm, world);
   if (!plan.found())
-    refuse_scene(scene, fmt::format("/goals/{}: {} found no path: {}", plan.goals.size() - 1,
-                                    plan.guide, plan.goals.back().path.cause));
+    refuse_scene(scene, fmt::format("/goals/{}: no path was found: {}", plan.goals.size() - 1,
+                                    plan.goals.back().path.cause));
   std::vector<MatrixXd> paths;
   for (const auto& goal : plan.goals) paths.push_back(goal.path.points);
   return paths;
@@ -156,10 +156,20 @@ SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& 
   return out;
 }
 
+// Whether the guesses go along searched paths: where the scene says so, and where a goal of the tip
+// leaves open at which joint positions the arm ends.
+bool uses_paths(const scene::Scene& scene) {
+  return scene.guide.type == scene::GuideType::rrt_connect ||
+         (scene.guide.type == scene::GuideType::on_request &&
+          std::any_of(scene.goals.begin(), scene.goals.end(), [](const scene::Goal& goal) {
+            return goal.type == scene::GoalType::position || goal.type == scene::GoalType::pose;
+          }));
+}
+
 }  // namespace
 
 SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& options) {
-  const bool guided = scene.guide.type != scene::GuideType::none;
+  const bool guided = uses_paths(scene);
   check_options(options);
   check_scene(scene, guided);
   const model::Model model = control::load_model(scene);

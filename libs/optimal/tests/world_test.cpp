@@ -107,6 +107,7 @@ TEST_CASE("scenes that cannot be optimised are refused in one line", "[optimal][
              Contains("scene: /model: damping"));
   CHECK_THAT(message([](Json& d) {
                d["goals"] = {{{"type", "position"}, {"position_m", {0.5, 0.2, 0.4}}}};
+               d["planner"] = {{"name", "hybrid"}, {"guide", "none"}};
              }),
              Contains("/goals/0: is a position") && Contains("--guide"));
   CHECK_THAT(message([](Json& d) { d["goals"][0]["q"][3] = 1.0; }),

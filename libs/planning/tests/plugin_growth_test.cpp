@@ -198,6 +198,12 @@ TEST_CASE("in hosts without a future of obstacles, all obstacles stand", "[plann
   host.draw_path(line);
   CHECK(drawn == 6);
 
+  raw.request_path = [](void*) { return 1; };
+  raw.struct_size = offsetof(hamelin_host, request_path);
+  CHECK_FALSE(host.request_path());
+  raw.struct_size = sizeof raw;
+  CHECK(host.request_path());
+
   hamelin_tick tick{};
   tick.moving_count = 5;
   tick.struct_size = offsetof(hamelin_tick, moving_count);

@@ -235,12 +235,7 @@ def test_counts_of_the_shield(document, scenes):
 def test_a_guide_without_a_thread(document, scenes):
     document["planner"] = {"name": "hybrid", "guide": "rrt-connect"}
     scene = hamelin.Scene(document, folder=scenes)
-    try:
-        controller = hamelin.Controller(scene, position=True, guide_thread=False)
-    except hamelin.Error as error:
-        if "OMPL" not in str(error):
-            raise
-        pytest.skip("hamelin is built without OMPL")
+    controller = hamelin.Controller(scene, position=True, guide_thread=False)
     servos = Servos(controller, scene.start_q)
     servos.move(300)
     assert controller.guide["searches"] == 0

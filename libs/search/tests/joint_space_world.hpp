@@ -33,12 +33,11 @@ class JointSpaceWorld final : public search::Query {
   /// Of the line from a to b.
   [[nodiscard]] double distance(const Eigen::VectorXd& a, const Eigen::VectorXd& b) const {
     double least = 1.0;
-    const Eigen::VectorXd line = b - a;
-    const double square = line.squaredNorm();
+    const double square = (b - a).squaredNorm();
     for (const Ball& ball : balls_) {
       const double s =
-          square > 0.0 ? std::clamp((ball.center - a).dot(line) / square, 0.0, 1.0) : 0.0;
-      least = std::min(least, (a + s * line - ball.center).norm() - ball.radius);
+          square > 0.0 ? std::clamp((ball.center - a).dot(b - a) / square, 0.0, 1.0) : 0.0;
+      least = std::min(least, (a + s * (b - a) - ball.center).norm() - ball.radius);
     }
     return least;
   }

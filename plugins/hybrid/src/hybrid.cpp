@@ -64,7 +64,7 @@ class Hybrid final : public planning::Planner {
         follower_(setup, model_),
         stall_(params["stall_time_s"]),
         contact_radius_(params["contact_radius_m"]),
-        searches_(params["escape"] == "search"),
+        asks_(params["escape"] == "search"),
         path_(setup.dof(), static_cast<Eigen::Index>(setup.path_points_max())) {
     if (params["steering"].get<bool>()) {
       steering_ = std::make_unique<Steering>(
@@ -192,11 +192,11 @@ class Hybrid final : public planning::Planner {
     measure_margins_ = true;
     path_.clear();
     path_position_ = 0.0;
+    searches_ = asks_;
     enter(Mode::goal, tick.time_s());
     if (!follows()) {
       take_path();
-      if (path_.empty() && searches_ && path_search() == HAMELIN_PATH_NOT_SOUGHT)
-        ask(tick.time_s());
+      if (path_.empty() && path_search() == HAMELIN_PATH_NOT_SOUGHT) (void)ask(tick.time_s());
       return;
     }
     anchor_.set(goal);
@@ -214,11 +214,12 @@ class Hybrid final : public planning::Planner {
     return HAMELIN_HAS_FIELD(goal_, hamelin_goal, path_search) ? goal_->path_search
                                                                : HAMELIN_PATH_NOT_SOUGHT;
   }
-  // Another goal follows, at which the arm waits for the path. @return whether there will be one
-  bool ask(double now) {
-    if (!host_.request_path()) return false;
-    enter(Mode::wait, now);
-    return true;
+  // Another goal follows, at which the arm waits for the path. If there will be none, the planner
+  // goes on as one that does not search.
+  [[nodiscard]] bool ask(double now) {
+    searches_ = searches_ && host_.request_path();
+    if (searches_) enter(Mode::wait, now);
+    return searches_;
   }
 
   [[nodiscard]] bool follows() const { return goal_->type == HAMELIN_GOAL_FOLLOW; }
@@ -329,21 +330,19 @@ class Hybrid final : public planning::Planner {
   // target is never given up: it may come back.
   void check_target(double now, planning::Command& command) {
     command.disable_stall_rule();
-    if (!searches_ && !steering_) return;
     const double distance = law_.distance(model_, drive_.ws(), drive_.q(), {goal_});
     if (mode_ == Mode::path_to_target) {
       if (distance < target_away || path_has_ended(now)) resume_target(now);
       return;
     }
     if (awaits_path_) return take_path_to_target(now, distance);
-    if (steering_ && !searches_ && steering_->turn().on()) return;
-    if (!is_held_from_target(distance)) blocked_since_s_ = now;
-    if (!was_held_from_target(now)) return;
-    blocked_since_s_ = now;
-    if (searches_)
-      search_target();
-    else
-      steering_->restart();
+    if (searches_) {
+      if (!is_held_from_target(distance)) blocked_since_s_ = now;
+      if (was_held_from_target(now)) search_target(now);
+    } else if (steering_ && !steering_->turn().on() && !is_held_from_target(distance)) {
+      if (was_held_from_target(now)) steering_->restart();
+      blocked_since_s_ = now;
+    }
   }
 
   [[nodiscard]] bool is_held_from_target(double distance) const {
@@ -374,7 +373,8 @@ class Hybrid final : public planning::Planner {
     enter(Mode::goal, now);
   }
 
-  void search_target() {
+  void search_target(double now) {
+    blocked_since_s_ = now;
     if (anchor_.searches > 0 && !anchor_.left_by(*goal_)) {
       if (anchor_.searches >= target_searches) return;
       ++anchor_.searches;
@@ -382,13 +382,13 @@ class Hybrid final : public planning::Planner {
       anchor_.set(*goal_);
       anchor_.searches = 1;
     }
-    awaits_path_ = host_.request_path();
+    searches_ = awaits_path_ = host_.request_path();
     if (awaits_path_) host_.info("searches a way to the target");
   }
 
   void check_stall(double now, const Target& target, double closing_speed,
                    planning::Command& command) {
-    if (searches_ || steering_) command.disable_stall_rule();
+    if (asks_ || steering_) command.disable_stall_rule();
     if (mode_ == Mode::wait) return;
     if (!evader_.evades()) {
       evades_since_s_ = now;
@@ -439,8 +439,9 @@ class Hybrid final : public planning::Planner {
   void leave_stall(double now, planning::Command& command) {
     if (leaves_path()) return leave_path(now);
     if (steering_ && steers_on(now)) return stall_.restart(now);
-    if (!searches_ || !ask(now)) return command.give_up(cause());
-    host_.info("stalled: asks for another path");
+    if (!searches_) return command.give_up(cause());
+    if (ask(now)) return host_.info("stalled: asks for another path");
+    stall_.restart(now);
   }
 
   // The cause of a stall, from the multipliers of the filter.
@@ -497,7 +498,7 @@ class Hybrid final : public planning::Planner {
   double velocity_gain_ = 0.0, follow_gain_ = 0.0, target_velocity_gain_ = 1.0,
          tracking_gain_ = 0.0, drive_acceleration_ = 0.0, acceleration_max_ = 0.0, brake_ = 0.0,
          rate_ = 0.0, joint_damping_ = 0.0, contact_radius_;
-  bool searches_;
+  bool asks_, searches_ = false;  ///< for paths; and may still do so at this goal
   JointPath path_;
   VectorXd u_, via_, lower_, upper_;
   const hamelin_goal* goal_ = nullptr;  ///< of goal_number_

@@ -127,6 +127,6 @@ TEST_CASE("plans have a certificate for each line and chain from goal to goal",
   const Json again = control::to_json(control::plan_paths(shelf({connect})));
   CHECK(again["paths"][0]["q"] == document["paths"][0]["q"]);
   CHECK(test::error_of([] { (void)control::plan_paths(shelf({"/planner/guide=none"})); })
-            .ends_with("shelf.json: /planner/guide: is none, expected a guide such as "
+            .ends_with("shelf.json: /planner/guide: is none, expected on-request or "
                        "rrt-connect"));
 }

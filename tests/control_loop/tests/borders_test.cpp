@@ -45,6 +45,7 @@ TEST_CASE("what a controller drives decides the bounds of safety, not the file o
   // for a scene of ideal actuation, also if a program changes it afterwards
   scene::Scene as_read = clutter();
   as_read.actuation.type = scene::ActuationType::ideal;
+  as_read.guide.type = scene::GuideType::none;  // nothing that takes its own time
   scene::Scene changed = as_read, stated = as_read;
   changed.actuation.type = stated.actuation.type = scene::ActuationType::sampled;
   stated.safety.tracking_rad = 2e-4;

@@ -54,8 +54,8 @@ TEST_CASE("the arm moves in MuJoCo where the build has it, and one line says so 
   CHECK(result["plant"]["contacts"] == 0);
   CHECK(result["plant"]["judge_contacts"] == 0);
   CHECK_FALSE(std::filesystem::exists(sandbox.path("MUJOCO_LOG.TXT")));
-  const auto described =
-      sandbox.run({"run", "data/scenes/paper_52_hybrid.json", "--plant", "mujoco", "--print-config"});
+  const auto described = sandbox.run(
+      {"run", "data/scenes/paper_52_hybrid.json", "--plant", "mujoco", "--print-config"});
   CHECK(described.exit_code == 0);
   CHECK(described.err ==
         "hamelin: note: data/scenes/paper_52_hybrid.json: /actuation/type: is sampled instead of "

@@ -109,7 +109,8 @@ TEST_CASE("a target is dragged through the boards of a shelf without contact", "
   check_limits(result);
 }
 
-TEST_CASE("without a search an arm turns past a wall to a target that rests behind it", "[follow]") {
+TEST_CASE("without a search an arm turns past a wall to a target that rests behind it",
+          "[follow]") {
   scene::Scene scene = shipped("data/scenes/follow.json");
   scene.goals[0].motion = scene::SineMotion{};
   scene.goals[0].pose = geometry::SE3{scene.goals[0].pose.R(), {0.4, 0.5, 0.3}};

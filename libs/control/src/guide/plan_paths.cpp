@@ -24,9 +24,9 @@ double process_cpu_s() {
 
 void check(const scene::Scene& scene) {
   if (scene.guide.type == scene::GuideType::none)
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: /planner/guide: is none, expected a guide such as rrt-connect",
-                            scene.name));
+    throw Error(
+        ErrorCode::invalid,
+        fmt::format("{}: /planner/guide: is none, expected on-request or rrt-connect", scene.name));
   for (std::size_t i = 0; i < scene.goals.size(); ++i)
     if (scene.goals[i].type == scene::GoalType::follow)
       throw Error(ErrorCode::invalid,
