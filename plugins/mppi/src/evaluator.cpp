@@ -28,8 +28,8 @@ double travel(const planning::Setup& setup, Index j) {
   return std::max(std::abs((*lower)[j]), std::abs((*upper)[j]));
 }
 
-}  // namespace
-
+// For each joint, an upper bound of how far it moves any point of the arm's shapes or its tip per
+// radian, or 1 for a prismatic joint [m].
 Eigen::VectorXd levers(const planning::Setup& setup, const model::Model& model) {
   const int n = model.dof();
   dynamics::Workspace ws(model);
@@ -52,6 +52,8 @@ Eigen::VectorXd levers(const planning::Setup& setup, const model::Model& model) 
   }
   return lever;
 }
+
+}  // namespace
 
 Evaluator::Evaluator(const planning::Host& host, const planning::Setup& setup,
                      const model::Model& model, Index point_count)

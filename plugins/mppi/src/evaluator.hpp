@@ -9,10 +9,6 @@
 
 namespace hamelin::mppi {
 
-/// For each joint, an upper bound of how far it moves any point of the arm's shapes or its tip per
-/// radian, or 1 for a prismatic joint [m].
-[[nodiscard]] Eigen::VectorXd levers(const planning::Setup& setup, const model::Model& model);
-
 /// Computes the costs of rollouts and checks motions. It belongs to one thread at a time; its query
 /// is refreshed on the thread of the tick. Only the constructor and refresh allocate.
 class Evaluator {

@@ -8,7 +8,7 @@
 namespace hamelin::mppi {
 
 /// A polyline of joint vectors that guides rollouts, with a cost to go for any place near it. A
-/// path of one point is a goal without a guide. The memory is allocated once.
+/// path of one point is a goal to which no path is known. The memory is allocated once.
 class JointPath {
  public:
   JointPath(Eigen::Index dof, Eigen::Index capacity)
@@ -17,17 +17,14 @@ class JointPath {
         turn_(to_size(capacity)) {}
 
   void clear() noexcept { size_ = 0; }
-  [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
   [[nodiscard]] Eigen::Index size() const noexcept { return size_; }
-  [[nodiscard]] Eigen::Index capacity() const noexcept { return points_.cols(); }
-  [[nodiscard]] auto point(Eigen::Index i) const { return points_.col(i); }
   [[nodiscard]] auto end() const { return points_.col(size_ - 1); }
   [[nodiscard]] double length() const noexcept { return size_ == 0 ? 0.0 : arc(size_ - 1); }
   [[nodiscard]] double arc(Eigen::Index i) const { return arc_[to_size(i)]; }
   /// Appends a point; does nothing if the capacity is used up.
   template <class Point>
   void add(const Point& q) {
-    if (size_ == capacity()) return;
+    if (size_ == points_.cols()) return;
     points_.col(size_) = q;
     arc_[to_size(size_)] =
         size_ == 0 ? 0.0 : arc(size_ - 1) + (points_.col(size_) - points_.col(size_ - 1)).norm();

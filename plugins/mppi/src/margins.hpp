@@ -1,18 +1,14 @@
 #pragma once
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
-#include <cstddef>
 
 namespace hamelin::mppi {
 
 /// The clearance that a configuration needs, and that from which on it costs nothing. Both are less
 /// near places where the arm must be although they have less clearance: where it is now (the first
-/// only), and goals. docs/theory.md (15.8)
+/// only), and a goal. docs/theory.md (15.8)
 class Margins {
  public:
-  static constexpr std::size_t max_goals = 6;
-
   /// @param full_m away from tight places @param least_m at any place
   /// @param slack_m by how much the clearance of a tight goal may be undercut
   /// @param range_m clearance from which on a place away from tight goals costs nothing
@@ -21,24 +17,14 @@ class Margins {
         least_(std::min(least_m, full_m)),
         slack_(slack_m),
         range_(std::max(range_m, full_m)) {
-    start_.q = Eigen::VectorXd::Zero(dof);
-    for (auto& goal : goals_) goal.q = start_.q;
+    start_.q = goal_.q = Eigen::VectorXd::Zero(dof);
   }
 
-  /// The same with a larger full margin.
-  [[nodiscard]] Margins with_reserve(double reserve_m) const {
-    Margins out = *this;
-    out.full_ += reserve_m;
-    return out;
-  }
-  void clear_goals() noexcept { goal_count_ = 0; }
   template <class Vector>
-  void add_goal(const Vector& q, double clearance_m) {
-    if (goal_count_ == max_goals) return;
-    auto& goal = goals_[goal_count_++];
-    goal.q = q;
-    goal.margin = std::min(full_, std::max(least_, clearance_m - slack_));
-    goal.range = std::min(range_, clearance_m);
+  void set_goal(const Vector& q, double clearance_m) {
+    goal_.q = q;
+    goal_.margin = std::min(full_, std::max(least_, clearance_m - slack_));
+    goal_.range = std::min(range_, clearance_m);
   }
   /// The place where a plan starts must not make it impossible, whatever its clearance.
   template <class Vector>
@@ -55,7 +41,7 @@ class Margins {
   [[nodiscard]] Required required(const Vector& q) const {
     Required out{full_, range_};
     lower(start_, q, out);
-    for (std::size_t i = 0; i < goal_count_; ++i) lower(goals_[i], q, out);
+    lower(goal_, q, out);
     return out;
   }
   /// The largest range of any place.
@@ -80,9 +66,7 @@ class Margins {
   }
 
   double full_, least_, slack_, range_;
-  Place start_;
-  std::array<Place, max_goals> goals_;
-  std::size_t goal_count_ = 0;
+  Place start_, goal_;
 };
 
 }  // namespace hamelin::mppi

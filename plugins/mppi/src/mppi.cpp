@@ -34,23 +34,20 @@ constexpr double beyond_shield_m = 0.002;
 // A joint that strays farther from its planned motion is not followed but planned for from where it
 // is [rad or m].
 constexpr double stray = 0.03;
-constexpr double stray_of_stop = 0.003;  // the same if a shield has stopped the arm in this period
-constexpr double reach = 2.0;            // stretch of the path that a rollout may join [rad or m]
-constexpr double noise_fade = 1.0;       // length to go below which the noise is less [rad or m]
-constexpr double least_noise = 0.15;     // share of the noise that remains where obstacles move
-constexpr double progress = 0.02;        // length that counts as progress [rad or m]
-constexpr double renewed = 0.2;  // progress after which searches are counted from zero again
-// Clearance that goals of the tip keep in addition, for each search that led nowhere [m].
-constexpr double search_reserve_m = 0.002;
+constexpr double stray_of_stop = 0.003;   // the same if a shield has stopped the arm in this period
+constexpr double reach = 2.0;             // stretch of the path that a rollout may join [rad or m]
+constexpr double noise_fade = 1.0;        // length to go below which the noise is less [rad or m]
+constexpr double least_noise = 0.15;      // share of the noise that remains where obstacles move
+constexpr double progress = 0.02;         // length that counts as progress [rad or m]
 constexpr double mover_patience_s = 3.0;  // least time until a stall where obstacles move
 constexpr double at_goal = 0.01;          // length to go at which nothing counts as a stall
-constexpr int posture_attempts = 20;      // of inverse kinematics without a guide
+constexpr int posture_attempts = 20;      // of inverse kinematics without a path
 constexpr std::size_t candidate_count = 4;
 
 class Mppi final : public planning::Planner {
  public:
-  static constexpr std::uint32_t properties =
-      HAMELIN_TICK_ALLOCATES | HAMELIN_USES_THREADS | HAMELIN_FOLLOWS_PATHS;
+  static constexpr std::uint32_t properties = HAMELIN_TICK_ALLOCATES | HAMELIN_USES_THREADS |
+                                              HAMELIN_FOLLOWS_PATHS | HAMELIN_ASKS_FOR_PATHS;
 
   Mppi(const planning::Host& host, const planning::Setup& setup, const Json& params)
       : host_(host),
@@ -65,31 +62,27 @@ class Mppi final : public planning::Planner {
         point_count_(3 + std::max(6L, std::lround(params["horizon_s"].get<double>() / spacing_s_))),
         box_(joint_box(setup)),
         kinematics_(model_, box_),
-        margins_(make_margins(setup, params)),
-        task_(setup.dof(), point_count_,
-              std::max<Index>(256, static_cast<Index>(setup.path_points_max()) + 1), margins_),
-        guide_(setup, model_, margins_, box_, levers(setup, model_),
-               params["guide_budget"].get<long>()),
-        pool_(host, setup, model_, point_count_, params["samples"], params["threads"], task_,
-              guide_),
+        task_(setup.dof(), point_count_, static_cast<Index>(setup.path_points_max()) + 1,
+              make_margins(setup, params)),
+        pool_(host, setup, model_, point_count_, params["samples"], params["threads"], task_),
         tracker_(setup.dof(), params["tracking_rate"], setup.control_period_s()),
         planned_(setup.dof()),
         average_(setup.dof(), point_count_),
-        uses_guide_(params["guide"] == "tree"),
+        searches_(params["guide"] == "search"),
         recorded_rollouts_(params["record_rollouts"]),
         drawn_(setup.dof(), point_count_),
         tip_path_(static_cast<std::size_t>(point_count_)) {
     plan_ = mean_ = MatrixXd::Zero(setup.dof(), point_count_);
-    hold_ = target_ = torque_ = VectorXd::Zero(setup.dof());
+    target_ = torque_ = VectorXd::Zero(setup.dof());
     weights_.resize(static_cast<std::size_t>(pool_.sample_count()));
     order_.resize(weights_.size());
     task_.seed = setup.seed();
-    task_.goal.q = hold_;
+    task_.goal.q = target_;
     check_horizon();
-    series_ = {
-        host.declare_series("plan_cost", "s"),         host.declare_series("mean_cost", "s"),
-        host.declare_series("effective_samples", ""),  host.declare_series("plan_clearance", "m"),
-        host.declare_series("colliding_rollouts", ""), host.declare_series("guide_queries", "")};
+    series_ = {host.declare_series("plan_cost", "s"), host.declare_series("mean_cost", "s"),
+               host.declare_series("effective_samples", ""),
+               host.declare_series("plan_clearance", "m"),
+               host.declare_series("colliding_rollouts", "")};
   }
   ~Mppi() override { pool_.finish(); }
 
@@ -104,8 +97,7 @@ class Mppi final : public planning::Planner {
 
   void reset(const planning::ConstVectorMap&, const planning::ConstVectorMap&) {
     pool_.finish();
-    guide_.stop();
-    searching_ = started_ = false;
+    waits_ = started_ = false;
     task_.plan = 0;
     known_goal_ = false;
     figures_ = {};
@@ -127,15 +119,14 @@ class Mppi final : public planning::Planner {
     tracker_.torque(model_, ws_, tick.q(), tick.v(), planned_, setup_.effort_max(), torque_);
     command.held_torque() = torque_;
     ++ticks_;
-    // The arm waits while the guide searches, and the planner gives up after too many searches.
-    if (uses_guide_) command.disable_stall_rule();
-    if (gives_up_)
-      command.give_up("no way: the guide found no path on which the arm made progress");
+    // The planner detects stalls itself, and gives up where it is refused another path.
+    if (searches_) command.disable_stall_rule();
+    if (gives_up_) command.give_up("no way: no path was found on which the arm made progress");
     for (std::size_t i = 0; i < series_.size(); ++i) command.set_series(series_[i], figures_[i]);
   }
 
  private:
-  enum Figure { plan_cost, mean_cost, effective_samples, plan_clearance, colliding, guide_queries };
+  enum Figure { plan_cost, mean_cost, effective_samples, plan_clearance, colliding };
 
   static Margins make_margins(const planning::Setup& setup, const Json& params) {
     const double shield = std::max(setup.shield_margin_m(), setup.shield_self_margin_m());
@@ -216,13 +207,13 @@ class Mppi final : public planning::Planner {
     shift(plan_, task_.mean);
     shift(MatrixXd(task_.best), task_.best);
     task_.best.leftCols<3>() = task_.mean.leftCols<3>();
+    evaluate(task_.mean, 0, 0.0, spacing_s_, planned_);
     if (!known_goal_ || goal_number_ != tick.goal_number()) set_goal(tick);
-    if (searching_ && !guide_.searches()) take_path();
     measure_start();
     check_progress(tick.time_s());
-    // An arm that waits where nothing moves needs no rollouts.
-    rolls_ = !searching_ || task_.moving;
-    pool_.start(guide_.checks() + tuning_.guide_queries, rolls_);
+    // An arm that comes to rest where it waits, and where nothing moves, needs no rollouts.
+    rolls_ = !waits_ || task_.moving || (task_.mean.rightCols<1>() - target_).norm() > at_goal;
+    if (rolls_) pool_.start();
   }
 
   static void shift(const MatrixXd& from, MatrixXd& to) {
@@ -245,29 +236,38 @@ class Mppi final : public planning::Planner {
     goal_number_ = tick.goal_number();
     known_goal_ = true;
     gives_up_ = false;
-    searches_ = 0;
-    failed_ = false;
-    searched_left_ = std::numeric_limits<double>::infinity();
-    task_.margins.clear_goals();
+    waits_ = false;
     task_.tip_cost = false;
     const auto way_points = setup_.path(from);
     if (way_points.cols() > 1) return follow_way_points(way_points);
-    if (uses_guide_) return search();
+    const std::int32_t path_search = HAMELIN_HAS_FIELD(&from, hamelin_goal, path_search)
+                                         ? from.path_search
+                                         : HAMELIN_PATH_NOT_SOUGHT;
+    if (searches_ && path_search == HAMELIN_PATH_NOT_SOUGHT && ask()) return;
     head_straight();
+    waits_ = path_search == HAMELIN_PATH_SOUGHT;
+  }
+
+  // The arm comes to rest at the end of its plan until it is shown where to wait for the path.
+  // @return whether there will be one
+  bool ask() {
+    if (!host_.request_path()) return false;
+    waits_ = true;
+    target_ = task_.mean.rightCols<1>();
+    task_.tip_cost = false;
+    head_for_target();
+    return true;
   }
 
   template <class Points>
   void follow_way_points(const Points& way_points) {
-    guide_.stop();
-    searching_ = false;
     task_.path.clear();
-    task_.path.add(task_.mean.rightCols<1>());
+    task_.path.add(planned_.q);
     for (Index i = 0; i < way_points.cols(); ++i) task_.path.add(way_points.col(i));
-    add_goal_margin(task_.goal.q);
-    begin_path();
+    begin_path(task_.goal.q);
   }
 
-  // Without a guide: straight to the goal, or to the nearest posture with the tip at it.
+  // Without a path: straight to the goal, or to the nearest posture with the tip at it.
   void head_straight() {
     target_ = task_.mean.rightCols<1>();
     if (task_.goal.type == HAMELIN_GOAL_JOINT)
@@ -275,10 +275,13 @@ class Mppi final : public planning::Planner {
     else
       find_posture();
     task_.tip_cost = task_.goal.type != HAMELIN_GOAL_JOINT;
+    head_for_target();
+  }
+
+  void head_for_target() {
     task_.path.clear();
     task_.path.add(target_);
-    add_goal_margin(target_);
-    begin_path();
+    begin_path(target_);
   }
 
   void find_posture() {
@@ -294,47 +297,18 @@ class Mppi final : public planning::Planner {
     }
   }
 
-  void add_goal_margin(const VectorXd& q) {
-    task_.margins.add_goal(q, pool_.evaluator().query().clearance(span_of(q)));
-  }
-
   [[nodiscard]] std::span<const double> span_of(const VectorXd& q) const {
     return {q.data(), static_cast<std::size_t>(q.size())};
   }
 
-  // The arm waits where the present plan ends, and searches from there.
-  void search() {
-    hold_ = task_.mean.rightCols<1>();
-    guide_.begin(task_.goal, hold_, setup_.seed(), goal_number_ * 1000003ULL + task_.plan,
-                 search_reserve_m * searches_);
-    searching_ = true;
-    failed_ = false;
-    ++searches_;
-    task_.path.clear();
-    task_.path.add(hold_);
-    begin_path();
-  }
-
-  void take_path() {
-    searching_ = false;
-    failed_ = guide_.path().empty();
-    if (failed_) return;
-    task_.path.clear();
-    for (Index i = 0; i < guide_.path().size(); ++i) task_.path.add(guide_.path().point(i));
-    task_.margins.clear_goals();
-    for (int i = 0; i < guide_.root_count(); ++i)
-      task_.margins.add_goal(guide_.root(i), guide_.root_clearance(i));
-    begin_path();
-  }
-
-  void begin_path() {
+  void begin_path(const VectorXd& end) {
+    task_.margins.set_goal(end, pool_.evaluator().query().clearance(span_of(end)));
     task_.path_from = 0.0;
     least_left_ = std::numeric_limits<double>::infinity();
   }
 
   // Where the next plan starts, on the path and with what clearance.
   void measure_start() {
-    evaluate(task_.mean, 0, 0.0, spacing_s_, planned_);
     task_.start_clearance_m = pool_.evaluator().query().clearance(span_of(planned_.q), spacing_s_);
     task_.margins.set_start(planned_.q, task_.start_clearance_m);
     const auto place = task_.path.cost_to_go(planned_.q, task_.path_from, task_.path_from + reach);
@@ -346,32 +320,24 @@ class Mppi final : public planning::Planner {
     task_.noise = share * tuning_.noise;
   }
 
-  // After a stall or a failed search the guide searches again. What moves is given time to leave.
+  // After a stall the planner asks for another path. What moves is given time to leave.
   void check_progress(double time_s) {
     const bool advances = left_ < at_goal || left_ < least_left_ - progress;
-    if (searching_ || (advances && !failed_)) {
+    if (waits_ || advances) {
       least_left_ = std::min(left_, least_left_);
       progress_s_ = time_s;
-      if (left_ < searched_left_ - renewed) searches_ = 0;
       return;
     }
-    double patience_s = failed_ ? 0.0 : tuning_.stall_time_s;
-    if (task_.moving) patience_s = std::max(tuning_.stall_time_s, mover_patience_s);
-    if (!uses_guide_ || gives_up_ || time_s - progress_s_ < patience_s) return;
-    if (searches_ >= tuning_.max_searches) {
-      gives_up_ = true;
-      return;
-    }
-    searched_left_ = failed_ ? searched_left_ : left_;
-    progress_s_ = time_s;
-    search();
-    measure_start();
+    double patience_s = tuning_.stall_time_s;
+    if (task_.moving) patience_s = std::max(patience_s, mover_patience_s);
+    if (!searches_ || gives_up_ || time_s - progress_s_ < patience_s) return;
+    gives_up_ = !ask();
+    if (!gives_up_) measure_start();
   }
 
   // docs/theory.md (15.12), (15.13)
   void finish_plan() {
     pool_.finish();
-    figures_[guide_queries] = static_cast<double>(guide_.checks());
     if (!rolls_) {
       plan_ = task_.best = task_.mean;
       return;
@@ -469,28 +435,25 @@ class Mppi final : public planning::Planner {
   Index point_count_;
   dynamics::JointBox box_;
   dynamics::InverseKinematics kinematics_;
-  Margins margins_;
   Task task_;
-  Guide guide_;
   RolloutPool pool_;
   Tracker tracker_;
   JointState planned_;
   Rollouts average_;
-  bool uses_guide_, started_ = false, searching_ = false, failed_ = false, stopped_ = false,
-                    gives_up_ = false, known_goal_ = false, rolls_ = false;
+  bool searches_;       ///< whether it asks for paths
+  bool waits_ = false;  ///< for a path
+  bool started_ = false, stopped_ = false, gives_up_ = false, known_goal_ = false, rolls_ = false;
   std::uint64_t goal_number_ = 0;
-  int searches_ = 0;
-  double left_ = 0.0, least_left_ = 0.0, searched_left_ = 0.0,
-         progress_s_ = 0.0;  ///< lengths to go, and since when
-  MatrixXd plan_, mean_;     ///< control points of the motion in execution, and of the average
-  VectorXd hold_, target_, torque_;
+  double left_ = 0.0, least_left_ = 0.0, progress_s_ = 0.0;  ///< lengths to go, and since when
+  MatrixXd plan_, mean_;  ///< control points of the motion in execution, and of the average
+  VectorXd target_, torque_;
   std::vector<double> weights_;
   std::vector<Index> order_;
   std::size_t recorded_rollouts_;
   MatrixXd drawn_;
   std::vector<Eigen::Vector3d> tip_path_;
-  std::array<std::int32_t, 6> series_{};
-  std::array<double, 6> figures_{};
+  std::array<std::int32_t, 5> series_{};
+  std::array<double, 5> figures_{};
 };
 
 }  // namespace

@@ -7,9 +7,8 @@ namespace hamelin::mppi {
 
 RolloutPool::RolloutPool(const planning::Host& host, const planning::Setup& setup,
                          const model::Model& model, Eigen::Index point_count, int samples,
-                         int threads, Task& task, Guide& guide)
+                         int threads, Task& task)
     : task_(task),
-      guide_(guide),
       blocks_(static_cast<std::size_t>(samples) / lane_count, Rollouts(model.dof(), point_count)) {
   for (int i = 0; i < std::max(1, threads); ++i) {
     evaluators_.push_back(std::make_unique<Evaluator>(host, setup, model, point_count));
@@ -22,13 +21,10 @@ void RolloutPool::refresh() {
   for (auto& evaluator : evaluators_) evaluator->refresh();
 }
 
-void RolloutPool::start(long guide_checks, bool rollouts) {
-  guide_from_ = guide_.checks();
-  guide_to_ = guide_checks;
+void RolloutPool::start() {
   done_ = 0;
   active_ = true;
-  rolls_ = rollouts;
-  if (workers_) workers_->start(rolls_ ? static_cast<int>(blocks_.size()) + 1 : 1);
+  if (workers_) workers_->start(static_cast<int>(blocks_.size()));
 }
 
 void RolloutPool::share(double of_whole) {
@@ -36,14 +32,11 @@ void RolloutPool::share(double of_whole) {
   const auto target = std::min(
       sample_count(),
       static_cast<Eigen::Index>(std::ceil(of_whole * static_cast<double>(sample_count()))));
-  for (; rolls_ && done_ < target; ++done_) {
+  for (; done_ < target; ++done_) {
     const auto block = static_cast<std::size_t>(done_ / lane_count);
     if (done_ % lane_count == 0) begin(0, block);
     evaluator().evaluate(task_, blocks_[block], done_ % lane_count);
   }
-  guide_.advance(
-      evaluator().query(),
-      guide_from_ + std::lround(of_whole * static_cast<double>(guide_to_ - guide_from_)));
 }
 
 void RolloutPool::finish() {
@@ -62,11 +55,8 @@ void RolloutPool::begin(std::size_t worker, std::size_t block) {
   evaluators_[worker]->begin(task_, blocks_[block]);
 }
 
-// The guide, whose work cannot be divided among threads, comes first.
 void RolloutPool::work(int worker, int unit) {
-  const auto w = static_cast<std::size_t>(worker);
-  if (unit == 0) return guide_.advance(evaluators_[w]->query(), guide_to_);
-  const auto block = static_cast<std::size_t>(unit) - 1;
+  const auto w = static_cast<std::size_t>(worker), block = static_cast<std::size_t>(unit);
   begin(w, block);
   for (Eigen::Index lane = 0; lane < lane_count; ++lane)
     evaluators_[w]->evaluate(task_, blocks_[block], lane);

@@ -4,27 +4,24 @@
 #include <vector>
 
 #include "evaluator.hpp"
-#include "guide.hpp"
 #include "sampler.hpp"
 #include "workers.hpp"
 
 namespace hamelin::mppi {
 
-/// Makes and evaluates the rollouts of one plan at a time, and advances the guide, on worker
-/// threads or in shares on the thread of the tick. What it computes does not depend on the number
+/// Makes and evaluates the rollouts of one plan at a time, on worker threads or in shares on the
+/// thread of the tick. What it computes does not depend on the number
 /// of threads, nor on their timing.
 class RolloutPool {
  public:
   /// @param threads 0: all work is done by share() and finish()
   RolloutPool(const planning::Host& host, const planning::Setup& setup, const model::Model& model,
-              Eigen::Index point_count, int samples, int threads, Task& task, Guide& guide);
+              Eigen::Index point_count, int samples, int threads, Task& task);
 
   /// Takes the newest snapshot of the world. Only while no plan is in work.
   void refresh();
   /// Starts the work on the task, which must not change until finish().
-  /// @param guide_checks number of queries that the guide may have used in the end
-  /// @param rollouts false: the guide only
-  void start(long guide_checks, bool rollouts);
+  void start();
   /// Without threads: does the work up to a share of the whole (0 to 1).
   void share(double of_whole);
   /// Returns when the work is done.
@@ -57,13 +54,11 @@ class RolloutPool {
   }
 
   Task& task_;
-  Guide& guide_;
   std::vector<std::unique_ptr<Evaluator>> evaluators_;
   std::vector<Sampler> samplers_;
   std::vector<Rollouts> blocks_;
-  long guide_from_ = 0, guide_to_ = 0;
   Eigen::Index done_ = 0;  ///< rollouts evaluated by share()
-  bool active_ = false, rolls_ = false;
+  bool active_ = false;
   std::optional<Workers> workers_;  ///< last, so that they end before what they use
 };
 

@@ -6,10 +6,9 @@ namespace hamelin::mppi {
 
 namespace {
 
-constexpr std::array fixed_params{"samples",           "horizon_s",     "plan_period_s",
-                                  "threads",           "margin_m",      "goal_margin_m",
-                                  "clearance_range_m", "query_range_m", "guide",
-                                  "guide_budget",      "tracking_rate", "record_rollouts"};
+constexpr std::array fixed_params{"samples",  "horizon_s",     "plan_period_s",     "threads",
+                                  "margin_m", "goal_margin_m", "clearance_range_m", "query_range_m",
+                                  "guide",    "tracking_rate", "record_rollouts"};
 
 }  // namespace
 
@@ -19,9 +18,7 @@ Tuning::Tuning(const Json& params)
       noise(params["noise_rad"]),
       cruise_speed(params["cruise_speed"]),
       acceleration_max(params["acceleration_max"]),
-      stall_time_s(params["stall_time_s"]),
-      guide_queries(params["guide_queries"]),
-      max_searches(params["max_searches"]) {}
+      stall_time_s(params["stall_time_s"]) {}
 
 void check_fixed_params(const Json& params, const Json& initial) {
   planning::check_fixed_params(params, initial, fixed_params);

@@ -10,8 +10,6 @@ struct Tuning {
 
   CostParams cost;
   double temperature_s, noise, cruise_speed, acceleration_max, stall_time_s;
-  long guide_queries;
-  int max_searches;
 };
 
 /// @throws Error invalid if a parameter differs that determines the size of memory, the crop of the

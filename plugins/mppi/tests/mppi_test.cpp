@@ -81,7 +81,7 @@ TEST_CASE("mppi reaches goals of each type in free space", "[mppi]") {
     CHECK(result.time_s > 0.75);
     CHECK(result.time_s < 3.0);
   }
-  SECTION("a position, with and without a guide") {
+  SECTION("a position, with and without a path") {
     Json scene = planar_scene({{"type", "position"}, {"position_m", {2.0, 2.5, 0.0}}});
     CHECK(run(scene).outcome == Outcome::reached);
     scene["planner"]["params"]["guide"] = "none";
@@ -150,8 +150,7 @@ TEST_CASE("mppi keeps the limits of speed, acceleration and torque", "[mppi]") {
 
 TEST_CASE("mppi gives up with a reason if no path is found", "[mppi]") {
   Json scene = planar_scene(joint_goal({1.2, 0.0, 0.0, 0.0}), Json::array({ball(0.6, 1.2, 0.4)}));
-  scene["planner"]["params"]["guide_budget"] = 2000;
-  scene["planner"]["params"]["max_searches"] = 2;
+  scene["planner"]["guide_options"] = {{"checks_max", 2000}, {"searches_max", 2}};
   const auto result = run(scene);
   CHECK(result.outcome == Outcome::stalled);
   CHECK(result.cause.find("no way") != std::string::npos);
@@ -196,7 +195,18 @@ class Bench : public planning::HostServices {
                              planning::ArrayOut<hamelin_contact>) override {
     return 0;
   }
+  bool request_path() override {
+    ++requests;
+    return searches;
+  }
   planning::LoadedPlanner& planner() { return *planner_; }
+  /// Shows the goal as another one. @param path_search what is known of a path to it
+  void show_goal(std::int32_t path_search) {
+    goal_.path_search = path_search;
+    ++goal_number_;
+  }
+  bool searches = false;  ///< what it answers to requests of paths
+  int requests = 0;
   /// The sum of all torques of 200 ticks with exact tracking of a double integrator.
   std::vector<double> torques() {
     std::vector<double> out;
@@ -210,6 +220,7 @@ class Bench : public planning::HostServices {
       input.q = q.data();
       input.v = v.data();
       input.goal = &goal_;
+      input.goal_number = goal_number_;
       input.speed_scale = 1.0;
       if (!planner_->tick(input, buffers_))
         throw std::runtime_error(std::string(planner_->error()));
@@ -226,6 +237,7 @@ class Bench : public planning::HostServices {
   planning::CommandBuffers buffers_;
   Eigen::VectorXd q_goal_ = Eigen::Vector4d(0.5, -0.3, 0.2, 0.4);
   hamelin_goal goal_{};
+  std::uint64_t goal_number_ = 1;
   std::optional<planning::LoadedPlanner> planner_;
 };
 
@@ -237,6 +249,32 @@ TEST_CASE("a planner that was reset repeats its answers", "[mppi]") {
   CHECK(*std::max_element(first.begin(), first.end()) > 1.0);
   bench.planner().reset(Eigen::VectorXd::Zero(4), Eigen::VectorXd::Zero(4));
   CHECK(bench.torques() == first);
+}
+
+TEST_CASE("mppi asks once for a path to a goal, and waits for it", "[mppi]") {
+  const auto largest = [](Bench& bench) {
+    const auto torques = bench.torques();
+    return std::max(std::abs(*std::max_element(torques.begin(), torques.end())),
+                    std::abs(*std::min_element(torques.begin(), torques.end())));
+  };
+  Bench bench(Json::object());
+  SECTION("a refusal sends it straight to the goal") {
+    CHECK(largest(bench) > 1.0);
+    CHECK(bench.requests == 1);
+  }
+  SECTION("it holds its posture until the goal changes") {
+    bench.searches = true;
+    CHECK(largest(bench) < 1e-6);
+    CHECK(bench.requests == 1);
+    bench.show_goal(HAMELIN_PATH_NOT_FOUND);
+    CHECK(largest(bench) > 1.0);
+    CHECK(bench.requests == 1);
+  }
+  SECTION("without a guide it does not ask") {
+    Bench unguided(Json{{"guide", "none"}});
+    CHECK(largest(unguided) > 1.0);
+    CHECK(unguided.requests == 0);
+  }
 }
 
 TEST_CASE("parameters are checked", "[mppi]") {

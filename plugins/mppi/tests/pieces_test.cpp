@@ -197,11 +197,11 @@ TEST_CASE("the cost to go is the least over all places of the path", "[mppi]") {
   }
 }
 
-TEST_CASE("margins are less at tight goals and where the arm is", "[mppi]") {
+TEST_CASE("margins are less at a tight goal and where the arm is", "[mppi]") {
   Margins margins(2, 0.01, 0.001, 0.003, 0.03);
   const Vector2d goal(1.0, 0.0), start(-1.0, 0.0), far(0.0, 3.0);
   CHECK(margins.required(goal).margin_m == 0.01);
-  margins.add_goal(goal, 0.006);
+  margins.set_goal(goal, 0.006);
   margins.set_start(start, 0.005);
   CHECK(margins.required(goal).margin_m == Approx(0.003));
   CHECK(margins.required(goal).range_m == Approx(0.006));
@@ -210,7 +210,7 @@ TEST_CASE("margins are less at tight goals and where the arm is", "[mppi]") {
   CHECK(margins.required(far).margin_m == Approx(0.01));
   // Halfway between the distances 0.1 and 0.8 half of the reduction remains.
   CHECK(margins.required(Vector2d(1.45, 0.0)).margin_m == Approx(0.0065));
-  margins.clear_goals();
+  margins.set_goal(goal, 0.5);
   CHECK(margins.required(goal).margin_m == Approx(0.01));
 }
 
