@@ -235,7 +235,6 @@ function(hamelin_install_package)
   install(FILES "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfig.cmake"
     "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfigVersion.cmake"
     "${PROJECT_SOURCE_DIR}/cmake/HamelinPlugin.cmake" "${PROJECT_SOURCE_DIR}/cmake/FindMuJoCo.cmake"
-    "${PROJECT_SOURCE_DIR}/cmake/FindOMPL.cmake"
     DESTINATION ${dest} COMPONENT libhamelin-dev)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/data/" "${PROJECT_SOURCE_DIR}/docs/schema"
     DESTINATION "${CMAKE_INSTALL_DATADIR}/hamelin" COMPONENT hamelin)

@@ -322,7 +322,7 @@ void add_draw(CLI::App& parent, int& exit_code) {
   auto* command = add_command(
       parent, "draw",
       "Draw a new set of problems with other seeds or for another arm. Takes a problem only if a "
-      "guide finds a path, so hamelin must be built with OMPL",
+      "search finds a path",
       "hamelin bench draw --name mine-1 --robot arm.urdf --draw-seed 7 -o mine.json\n"
       "hamelin bench draw --name mine-2 --robot arm.urdf --family shelf,cage -o mine.json");
   const auto flags = std::make_shared<DrawFlags>();

@@ -140,7 +140,7 @@ def plan(
 ) -> PathPlan:
     """Searches a path that is proved clear to each goal of a scene, as `hamelin plan`.
 
-    scene: a file, a Scene, or a document as a dict. guide: "rrt-connect", "rrt-star", ...; None:
+    scene: a file, a Scene, or a document as a dict. guide: as in a scene; None:
     the scene's. checks: after which a search ends without a path. set: values such as
     "/planner/guide_options/margin_m=0.02".
     """

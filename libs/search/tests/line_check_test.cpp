@@ -1,21 +1,29 @@
 #include "hamelin/search/line_check.hpp"
 
 #include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "../src/kernel/line_lanes.hpp"
 #include "hamelin/core/isa.hpp"
+#include "hamelin/core/isa_kernels.hpp"
 #include "hamelin/core/rng.hpp"
-#include "hamelin/description/description.hpp"
+#include "hamelin/description/robot_io.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/scene/payload.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "hamelin/search/edge_check.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/robots.hpp"
+
+namespace hamelin::search::kernel {
+HAMELIN_SELECT_KERNELS(LineKernels, line_kernels)
+}  // namespace hamelin::search::kernel
 
 using namespace hamelin;
 using Eigen::Vector3d;
@@ -278,4 +286,22 @@ TEST_CASE("checks of lines do not allocate", "[search][line]") {
           for (std::size_t i = 1; i < q.size(); ++i)
             (void)rig.line.motion_clear(q[i - 1], q[i - 1] + 0.2 * (q[i] - q[i - 1]));
         }) == 0);
+}
+
+TEST_CASE("sine and cosine in the lanes are off by less than the theory allows", "[search][line]") {
+  const auto sincos = search::kernel::select_line_kernels(default_isa()).sincos;
+  Rng rng(5);
+  double worst = 0.0;
+  for (int i = 0; i < 20000; ++i) {
+    std::array<float, search::kernel::lanes> x{}, sine{}, cosine{};
+    for (float& number : x) number = static_cast<float>(rng.uniform(-12.0, 12.0));
+    sincos(x.data(), sine.data(), cosine.data());
+    for (std::size_t l = 0; l < x.size(); ++l) {
+      const auto exact = static_cast<double>(x[l]);
+      worst = std::max({worst, std::abs(static_cast<double>(sine[l]) - std::sin(exact)),
+                        std::abs(static_cast<double>(cosine[l]) - std::cos(exact))});
+    }
+  }
+  CHECK(worst < 8.0 * 0x1p-24);
+  CHECK(worst > 0.5 * 0x1p-24);  // it is single precision
 }

@@ -196,8 +196,6 @@ TEST_CASE("a set is drawn again with the same bytes, and its problems are solved
                         "--draw-seed",  "3",
                         "-o",           "one.json"};
   const auto output = sandbox.run(command);
-  test::skip_unless(output.exit_code != 2 || output.err.find("OMPL") == std::string::npos,
-                    "this build is without OMPL");
   CAPTURE(output.err);
   REQUIRE(output.exit_code == 0);
   Strings again = command;

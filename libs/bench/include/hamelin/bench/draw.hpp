@@ -30,7 +30,7 @@ struct DrawOptions {
 /// motion between them meets an obstacle or the arm itself, and a guide (RRT-Connect) finds a path
 /// that is proved clear, along which the judge, too, finds no contact after it was rounded to 0.1
 /// mrad.
-/// @throws Error invalid if the build has no OMPL, or if a family yields too few problems
+/// @throws Error invalid if a family yields too few problems
 [[nodiscard]] ProblemSet draw_problem_set(const DrawOptions& options);
 
 }  // namespace hamelin::bench

@@ -35,8 +35,8 @@ struct PathPlan {
 
 /// Searches a path from the start of a scene to its first goal, and from each goal to the next, in
 /// the world as it is at time 0.
-/// @throws Error io, parse or invalid for bad input, a scene without guide, a goal that follows a
-///         target, or a build without OMPL
+/// @throws Error io, parse or invalid for bad input, a scene with guide none, or a goal that
+///         follows a target
 /// @param poll called now and then during searches; it may throw to end them
 [[nodiscard]] PathPlan plan_paths(const scene::Scene& scene,
                                   const std::function<void()>& poll = {});

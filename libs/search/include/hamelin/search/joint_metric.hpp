@@ -7,7 +7,7 @@
 
 namespace hamelin::search {
 
-/// The weight of each joint in distances between configurations, docs/theory.md (17.16): by how much
+/// The weight of each joint in distances between configurations, docs/theory.md (17.17): by how much
 /// of the arm it moves how far, so that radians and metres may be mixed. It is 1 for a revolute
 /// joint with a long lever.
 [[nodiscard]] Eigen::VectorXd joint_weights(const model::Model& model);

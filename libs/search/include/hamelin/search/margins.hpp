@@ -17,7 +17,7 @@ class Margins {
   };
 
   /// @param full_m away from tight places
-  /// @param weights of the joints in distances between configurations, docs/theory.md (17.16); of
+  /// @param weights of the joints in distances between configurations, docs/theory.md (17.17); of
   ///        size zero: ones
   explicit Margins(double full_m, Eigen::VectorXd weights = {})
       : full_(full_m), weights_(std::move(weights)) {}

@@ -6,7 +6,7 @@ namespace hamelin::test {
 /// Ends the test in progress, which CTest then counts as skipped, or as failed if one of its
 /// assertions failed before. All tests that cannot run here end by this function, so that none of
 /// them counts as passed. `tests/may_skip.txt` lists the tests that may do so.
-/// @param reason why the test cannot run, e.g. "this build is without OMPL"
+/// @param reason why the test cannot run, e.g. "this build is without Ipopt"
 [[noreturn]] void skip(const std::string& reason);
 
 /// Skips the rest of the test unless a condition holds.

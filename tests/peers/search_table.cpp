@@ -1,0 +1,173 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <ctime>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "guide/guide_query.hpp"
+#include "hamelin/control/preparation.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/isa.hpp"
+#include "ompl_search.hpp"
+
+// hamelin_search_peers [--seeds N] [--list] [--ours] SCENE...: searches a path to the first goal of
+// each scene by libs/search, and by OMPL's planners on the same proofs of motions. Prints how many
+// were found, CPU times until the first path and with shortening, checks and lengths. OMPL is given
+// the configuration at which our path ends, and so needs no inverse kinematics.
+namespace {
+
+using namespace hamelin;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+double cpu_s() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+struct Rig {
+  explicit Rig(const std::string& file)
+      : scene(scene::read_scene(file)),
+        arm(control::load_model(scene)),
+        world(scene, arm, {}),
+        view(scene, arm, world),
+        query(arm, world, view),
+        settings(control::guide_settings(scene, arm, view, {},
+                                         scene.planner ? scene.planner->params : Json())),
+        box(arm.dof(), settings.q_lower, settings.q_upper, 1e-3) {}
+  scene::Scene scene;
+  model::Model arm;
+  control::World world;
+  control::WorldView view;
+  control::GuideQuery query;
+  search::Settings settings;
+  dynamics::JointBox box;
+};
+
+double quantile(std::vector<double> x, double p) {
+  if (x.empty()) return std::nan("");
+  std::sort(x.begin(), x.end());
+  const double at = std::floor(p * static_cast<double>(x.size()));
+  return x[static_cast<std::size_t>(std::min(at, static_cast<double>(x.size() - 1)))];
+}
+
+struct Figures {
+  int searches = 0, found = 0;
+  std::vector<double> first_ms, time_ms, checks, length;
+  void add(bool was_found, double first_s, double all_s, long used, double path_length) {
+    ++searches;
+    if (!was_found) return;
+    ++found;
+    first_ms.push_back(1e3 * first_s);
+    time_ms.push_back(1e3 * all_s);
+    checks.push_back(static_cast<double>(used));
+    length.push_back(path_length);
+  }
+};
+
+void print(const std::string& name, const Figures& f) {
+  fmt::print(
+      "{:<16} {:>4}/{:<4} {:>7.3f} {:>7.3f} {:>7.3f} {:>8.3f} | {:>7.3f} {:>7.3f} {:>8.3f} "
+      "{:>8.0f} {:>7.3f}\n",
+      name, f.found, f.searches, quantile(f.first_ms, 0.5), quantile(f.first_ms, 0.75),
+      quantile(f.first_ms, 0.95), quantile(f.first_ms, 1.0), quantile(f.time_ms, 0.5),
+      quantile(f.time_ms, 0.95), quantile(f.time_ms, 1.0), quantile(f.checks, 0.5),
+      quantile(f.length, 0.5));
+}
+
+search::Path search_ours(Rig& rig, int seed, bool list, Figures& figures) {
+  search::Settings settings = rig.settings;
+  settings.seed = static_cast<std::uint64_t>(seed);
+  search::Search search(rig.arm, settings);
+  rig.query.refresh(0.0);
+  const long before = rig.query.checks();
+  const double since = cpu_s();
+  search.begin({rig.scene.start_q, {rig.scene.goals.front()}, 1}, rig.query);
+  double first_s = 0.0;
+  bool ended = false;
+  while (!ended) {
+    ended = search.advance(1);
+    if (first_s == 0.0 && search.path().planned.cols() > 0) first_s = cpu_s() - since;
+  }
+  const double all_s = cpu_s() - since;
+  const search::Path& path = search.path();
+  figures.add(path.found(), first_s, all_s, rig.query.checks() - before, path.length);
+  if (list)
+    fmt::print(
+        "  {} seed {}: {:.3f} and {:.3f} ms, {} checks, {} roots, margin {:.4f} m, {:.3f} {}\n",
+        rig.scene.name, seed, 1e3 * first_s, 1e3 * all_s, path.checks, path.roots, path.margin_m,
+        path.length, path.cause);
+  return path;
+}
+
+void search_theirs(Rig& rig, const std::string& planner, int seed, const search::Path& ours,
+                   Figures& figures) {
+  search::Margins margins(ours.margin_m);
+  const VectorXd start = rig.scene.start_q, goal = ours.points.rightCols(1);
+  for (const VectorXd& q : {start, goal})
+    margins.add(q, std::max(0.5e-3, rig.query.clearance(q, -1.0) - rig.settings.slack_m), 0.2, 0.9);
+  rig.query.set_margins(margins);
+  const auto search = [&](bool simplifies) {
+    return peers::ompl_search({planner, rig.box, start, goal, rig.query,
+                               static_cast<std::uint64_t>(seed), rig.settings.checks_max},
+                              simplifies);
+  };
+  const long before = rig.query.checks();
+  const double since = cpu_s();
+  const MatrixXd first = search(false);
+  const double first_s = cpu_s() - since;
+  const MatrixXd path = search(true);
+  figures.add(path.cols() > 0, first_s, cpu_s() - since - first_s, rig.query.checks() - before,
+              search::path_length(path));
+}
+
+int run(int argc, char** argv) {
+  int seeds = 1;
+  bool list = false, only_ours = false;
+  std::vector<std::unique_ptr<Rig>> rigs;
+  for (int i = 1; i < argc; ++i) {
+    const std::string arg = argv[i];
+    if (arg == "--seeds" && i + 1 < argc)
+      seeds = std::atoi(argv[++i]);
+    else if (arg == "--list")
+      list = true;
+    else if (arg == "--ours")
+      only_ours = true;
+    else
+      rigs.push_back(std::make_unique<Rig>(arg));
+  }
+  fmt::print("instruction set {}\n", to_string(default_isa()));
+  fmt::print("{:<16} {:>9} {:>7} {:>7} {:>7} {:>8} | {:>7} {:>7} {:>8} {:>8} {:>7}\n", "search",
+             "found", "p50 ms", "p75", "p95", "max", "all p50", "p95", "max", "checks", "length");
+  Figures ours;
+  std::vector<search::Path> paths;
+  for (auto& rig : rigs)
+    for (int seed = 1; seed <= seeds; ++seed) paths.push_back(search_ours(*rig, seed, list, ours));
+  print("hamelin", ours);
+  if (only_ours) return 0;
+  for (const std::string& planner : peers::ompl_planners()) {
+    Figures theirs;
+    auto path = paths.begin();
+    for (auto& rig : rigs)
+      for (int seed = 1; seed <= seeds; ++seed, ++path)
+        if (path->found()) search_theirs(*rig, planner, seed, *path, theirs);
+    print(planner, theirs);
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const Error& e) {
+    fmt::print(stderr, "{}\n", e.what());
+    return 2;
+  }
+}
