@@ -141,7 +141,7 @@ int run(int argc, char** argv) {
     else
       rigs.push_back(std::make_unique<Rig>(arg));
   }
-  fmt::print("instruction set {}\n", to_string(default_isa()));
+  fmt::print("instruction set {}\n", name_of(default_isa()));
   fmt::print("{:<16} {:>9} {:>7} {:>7} {:>7} {:>8} | {:>7} {:>7} {:>8} {:>8} {:>7}\n", "search",
              "found", "p50 ms", "p75", "p95", "max", "all p50", "p95", "max", "checks", "length");
   Figures ours;

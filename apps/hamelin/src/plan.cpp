@@ -65,8 +65,8 @@ void add_plan(CLI::App& app, int& exit_code) {
       add_command(app, "plan",
                   "Search a proved collision-free joint path to each goal of a scene. "
                   "The exit code is 1 if there is a goal to which no path was found",
-                  "hamelin plan data/scenes/shelf.json --guide rrt-connect -o path.json\n"
-                  "hamelin plan data/scenes/shelf.json --guide bit-star --checks 100000 --json");
+                  "hamelin plan data/scenes/shelf.json -o path.json\n"
+                  "hamelin plan data/scenes/shelf.json --seed 2 --checks 100000 --json");
   const auto options = std::make_shared<PlanOptions>();
   command->add_option("scene", options->file, "scene file")->required()->type_name("SCENE.json");
   add_guide_option(*command, options->flags);

@@ -57,7 +57,7 @@ TEST_CASE("a file that is not a log is refused in one line with its name", "[rep
       {"{\"schema\": \"hamelin.scene/1\"}\n", "its first line is not a header"},
       {text.substr(header), "its first line is not a header"},
       {damaged, "line 2: q: expected 7 numbers"},
-      {backwards, "line 5: k: 1 after 2"},
+      {backwards, "line 6: k: 1 after 2"},
       {text + text.substr(header), "follows the result"},
       {text.substr(0, header) + "{\"type\":\"tock\"}\n", "line 2: type \"tock\""},
       {text.substr(0, header) + "{\"type\":\"tick\",\"k\":0,\"time_s\":\"now\"}\n",

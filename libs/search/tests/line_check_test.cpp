@@ -275,16 +275,18 @@ TEST_CASE("lines have the same answers and the same work on all instruction sets
 TEST_CASE("checks of lines do not allocate", "[search][line]") {
   LineRig rig(panda());
   search::Margins margins(0.012);
-  std::vector<VectorXd> q;
-  for (int i = 0; i < 300; ++i) q.push_back(rig.random_q());
-  margins.add(q[0], 0.002, 0.02, 0.3);
+  std::vector<std::pair<VectorXd, VectorXd>> lines;
+  for (int i = 0; i < 300; ++i) {
+    const VectorXd a = rig.random_q();
+    lines.emplace_back(a, a + 0.2 * (rig.random_q() - a));
+  }
+  margins.add(lines[0].first, 0.002, 0.02, 0.3);
   rig.line.set_margins(margins);
-  (void)rig.line.motion_clear(q[0], q[1]);
+  (void)rig.line.motion_clear(lines[0].first, lines[0].second);
   test::require_allocation_count();
   CHECK(test::allocations_in([&] {
           rig.line.set_margins(margins);
-          for (std::size_t i = 1; i < q.size(); ++i)
-            (void)rig.line.motion_clear(q[i - 1], q[i - 1] + 0.2 * (q[i] - q[i - 1]));
+          for (const auto& [a, b] : lines) (void)rig.line.motion_clear(a, b);
         }) == 0);
 }
 

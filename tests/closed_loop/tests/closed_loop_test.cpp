@@ -484,31 +484,3 @@ TEST_CASE("a tick with everything that can be modelled does not allocate",
   (void)allocations(0.2);
   CHECK(allocations(2.0) == allocations(1.0));
 }
-
-TEST_CASE("a tick of hybrid does not allocate while it searches", "[simulation][allocation]") {
-  test::require_allocation_count();
-  // The first link cannot turn past either ball, so no search finds a path.
-  const TemporaryFolder folder;
-  const auto loaded = keep_loaded("hybrid");
-  Json scene = scene_52();
-  scene["goals"] = {{{"type", "joint"}, {"q", {std::acos(-1.0), 0.0, 0.0, 0.0}}}};
-  scene["obstacles"] = {ball("above", 0.0, 0.6, 0.1), ball("below", 0.0, -0.6, 0.1),
-                        moving(ball("near the base", -0.12, 0.0, 0.05), 0.0, 0.02)};
-  scene["model"]["self_collision"] = true;
-  const auto run = [&](const std::string& escape, double duration_s) {
-    scene["planner"] = {{"name", "hybrid"}, {"params", {{"escape", escape}, {"steering", false}}}};
-    scene["duration_s"] = duration_s;
-    return run_scene(folder, scene);
-  };
-  const auto held = run("none", 40.0);
-  REQUIRE(held.outcome == Outcome::stalled);
-  const auto allocations = [&](double duration_s) {
-    return test::allocations_in([&] {
-      const auto result = run("search", duration_s);
-      CHECK(result.outcome == Outcome::timeout);
-    });
-  };
-  const double searching_from = 0.004 * std::ceil(held.time_s / 0.004);
-  (void)allocations(searching_from);
-  CHECK(allocations(searching_from + 4.0) == allocations(searching_from));
-}

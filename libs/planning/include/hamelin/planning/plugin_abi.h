@@ -393,7 +393,7 @@ typedef struct hamelin_host {
    * arm is, so that it waits there; then a joint goal with the path, or the goal itself if none was
    * found. hamelin_goal.path_search says which. A goal that follows a target stays, and its path leads
    * to where the target was. Paths follow the map: where it changes, what is left of a path is
-   * proved again, or searched anew. Only planners with the property HAMELIN_ASKS_FOR_PATHS may ask. */
+   * proved again, or searched again. Only planners with the property HAMELIN_ASKS_FOR_PATHS may ask. */
   int32_t (*request_path)(void* context);
 } hamelin_host;
 

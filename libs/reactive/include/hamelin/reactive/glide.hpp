@@ -7,7 +7,7 @@
 namespace hamelin::reactive {
 
 /// An arm without dynamics that is moved in long steps along obstacles and joint limits by a
-/// velocity under a safety filter: docs/theory.md (10.26). Predictions are made of such steps. Only
+/// velocity under a safety filter: docs/theory.md (10.26), (10.27). Predictions are made of such steps. Only
 /// the constructor allocates.
 class Glide {
  public:
