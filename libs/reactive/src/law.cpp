@@ -78,7 +78,7 @@ double Law::attract(const model::Model& model, const dynamics::Workspace& ws,
       u = *target.via - q;
     else
       u = planning::ConstVectorMap(target.goal->q, q.size()) - q;
-    const double error = u.norm();
+    const double error = u.lpNorm<Eigen::Infinity>();
     if (target.passing)
       u *= params_.cruise_speed / std::max(error, passing_distance);
     else if (error > 0.0)

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <variant>
+
+#include "lane_chain.hpp"
 
 namespace hamelin::search {
 
@@ -18,10 +19,6 @@ constexpr double free_travel_m = 2.0;  // of a prismatic joint without limits
 constexpr double sphere_excess_m = 1e-3;
 constexpr double radius_excess = 1e-6;  // of balls, above what rounding to float can take [m]
 
-void to_floats(const Vector3d& from, float* to) {
-  for (Index i = 0; i < 3; ++i) to[i] = static_cast<float>(from[i]);
-}
-
 float above(double x) {
   return std::nextafter(static_cast<float>(x), std::numeric_limits<float>::infinity());
 }
@@ -30,33 +27,10 @@ float under(double x) {
   return std::nextafter(static_cast<float>(x), -std::numeric_limits<float>::infinity());
 }
 
-kernel::Joint joint_of(const model::SpatialLink& link) {
-  kernel::Joint joint{};
-  joint.cos_alpha = static_cast<float>(link.cos_alpha);
-  joint.sin_alpha = static_cast<float>(link.sin_alpha);
-  to_floats({link.p0.x, link.p0.y, link.p0.z}, joint.p);
-  joint.turn = link.prismatic ? 0.0F : 1.0F;
-  if (link.prismatic) to_floats({0.0, -link.sin_alpha, link.cos_alpha}, joint.slide);
-  joint.sine = static_cast<float>(std::sin(link.offset));
-  joint.cosine = static_cast<float>(std::cos(link.offset));
-  return joint;
-}
-
-kernel::Joint joint_of(const model::PlanarLink& link) {
-  kernel::Joint joint{};
-  joint.cos_alpha = 1.0F;
-  to_floats({link.p0x, link.p0y, 0.0}, joint.p);
-  joint.turn = link.prismatic ? 0.0F : static_cast<float>(link.direction);
-  joint.sine = static_cast<float>(std::sin(link.offset));
-  joint.cosine = static_cast<float>(std::cos(link.offset));
-  if (link.prismatic) to_floats({std::cos(link.offset), std::sin(link.offset), 0.0}, joint.slide);
-  return joint;
-}
-
 }  // namespace
 
 LineArm::LineArm(const model::Model& model, const scene::SelfField* self)
-    : model_(model), levers_(model, self), travel_(model.dof()) {
+    : model_(model), levers_(model, self), joints_(lane_joints(model)), travel_(model.dof()) {
   fits_ = model.dof() <= kernel::joints_max;
   for (Index j = 0; j < model.dof(); ++j) {
     const auto& joint = model.robot().links[static_cast<std::size_t>(j)].joint;
@@ -70,25 +44,16 @@ LineArm::LineArm(const model::Model& model, const scene::SelfField* self)
   for (Index j = 0; j < model.dof(); ++j)
     if (levers_.slides(j)) farthest[j] = travel_[j];
   levers_.extend_travel(farthest, Eigen::VectorXd::Zero(model.dof()));
-  add_joints();
   add_parts(self);
   fits_ = fits_ && parts_.size() <= kernel::parts_max && spheres_.size() <= kernel::spheres_max &&
           pairs_.size() <= kernel::pairs_max;
-  arm_.dof = model.dof();
+  arm_.chain.dof = model.dof();
   arm_.part_count = static_cast<int>(parts_.size());
   arm_.pair_count = static_cast<int>(pairs_.size());
-  arm_.joints = joints_.data();
+  arm_.chain.joints = joints_.data();
   arm_.parts = parts_.data();
   arm_.spheres = spheres_.data();
   arm_.pairs = pairs_.data();
-}
-
-void LineArm::add_joints() {
-  std::visit(
-      [&](const auto& chain) {
-        for (const auto& link : chain.links) joints_.push_back(joint_of(link));
-      },
-      model_.chain());
 }
 
 void LineArm::add_parts(const scene::SelfField* self) {
@@ -199,11 +164,8 @@ void LineArm::add_part(int link, const std::vector<int>& shapes) {
 }
 
 void LineArm::place(const geometry::SE3& frame) {
-  const geometry::SE3 inverse = frame.inverse(), root = inverse * model_.root();
-  to_floats(root.p(), arm_.root_p);
-  to_floats(root.R().col(0), arm_.root_x);
-  to_floats(root.R().col(1), arm_.root_y);
-  to_floats(root.R().col(2), arm_.root_z);
+  const geometry::SE3 inverse = frame.inverse();
+  place_chain(model_, frame, arm_.chain);
   auto fixed = fixed_centers_.begin();
   for (kernel::Part& part : parts_) {
     if (part.link >= 0) continue;
@@ -211,7 +173,7 @@ void LineArm::place(const geometry::SE3& frame) {
     for (int i = part.first; i < part.first + part.count; ++i)
       to_floats(inverse * *fixed++, spheres_[static_cast<std::size_t>(i)].center);
   }
-  bound_rounding(root);
+  bound_rounding(inverse * model_.root());
 }
 
 // docs/theory.md (17.13)–(17.15)

@@ -46,7 +46,6 @@ class LineArm {
     double radius, inner;
     int shape;
   };
-  void add_joints();
   void add_parts(const scene::SelfField* self);
   void add_part(int link, const std::vector<int>& shapes);
   void add_shape(int shape, std::vector<Ball>& balls) const;

@@ -11,6 +11,7 @@
 #include "hamelin/core/isa_kernels.hpp"
 #include "hamelin/search/edge_check.hpp"
 #include "kernel/line_lanes.hpp"
+#include "lane_chain.hpp"
 #include "line_arm.hpp"
 
 namespace hamelin::search {
@@ -224,7 +225,7 @@ class LineCheck::Impl {
     abs_dq_ = dq_.cwiseAbs();
     kernel::Line& line = *line_;
     for (Index j = 0; j < a.size(); ++j) {
-      const kernel::Joint& joint = arm_.view().joints[j];
+      const kernel::Joint& joint = arm_.view().chain.joints[j];
       if (joint.turn == 0.0F) {
         if (!(std::max(std::abs(a[j]), std::abs(b[j])) <= arm_.travel(j))) return false;
         line.start[j] = static_cast<float>(a[j]);
@@ -234,7 +235,7 @@ class LineCheck::Impl {
       if (!(abs_dq_[j] <= LineArm::step_max)) return false;
       const double turn = static_cast<double>(joint.turn);
       line.start[j] = static_cast<float>(std::remainder(
-          turn * a[j] + offset(static_cast<std::size_t>(j)), 2.0 * std::numbers::pi));
+          turn * a[j] + joint_offset(model_, static_cast<std::size_t>(j)), 2.0 * std::numbers::pi));
       line.step[j] = static_cast<float>(turn * dq_[j]);
     }
     arm_.levers().curvature(dq_, curvature_);
@@ -244,10 +245,6 @@ class LineCheck::Impl {
     for (Index i = 0; i < pair_way_.size(); ++i) line.way[i] = inflated(pair_way_[i]);
     line.speed_slack = inflated(arm_.velocity_rounding() * abs_dq_.sum());
     return set_places(a);
-  }
-
-  [[nodiscard]] double offset(std::size_t joint) const {
-    return std::visit([&](const auto& chain) { return chain.links[joint].offset; }, model_.chain());
   }
 
   bool set_places(const VectorXd& a) {

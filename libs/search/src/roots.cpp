@@ -2,17 +2,19 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bit>
+
+#include "hamelin/search/joint_metric.hpp"
 
 namespace hamelin::search {
 
-using Eigen::Index;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
 
 // Of each goal: attempts in all, attempts where nothing was found yet, and roots.
-constexpr int attempts_max = 60, attempts_for_one = 600;
+constexpr int attempts_max = 64, attempts_for_one = 640;
 constexpr std::size_t roots_max = 6;
 // Share of the tolerance of a joint goal within which other places are drawn.
 constexpr double joint_tolerance_share = 0.9;
@@ -47,13 +49,20 @@ dynamics::TipTarget tip_target(const scene::Goal& goal) {
 
 }  // namespace
 
-Roots::Roots(const model::Model& model, const dynamics::JointBox& box, const Settings& settings)
-    : box_(box), settings_(settings), kinematics_(model, box), q_(VectorXd::Zero(model.dof())) {}
+Roots::Roots(const model::Model& model, const dynamics::JointBox& box, const Settings& settings,
+             const VectorXd& weights)
+    : box_(box),
+      settings_(settings),
+      weights_(weights),
+      root_lanes_(model, box),
+      kinematics_(model, box),
+      q_(Eigen::MatrixXd::Zero(model.dof(), kernel::lanes)),
+      sample_(VectorXd::Zero(model.dof())) {}
 
 void Roots::begin(const Problem& problem) {
   problem_ = &problem;
-  attempt_ = 0;
-  q_ = problem.start;
+  attempts_ = rounds_ = next_ = ordered_ = 0;
+  goal_ = 0;
   found_.assign(problem.goals.size(), 0);
 }
 
@@ -62,50 +71,79 @@ bool Roots::tries(std::size_t roots) const noexcept {
   if (std::all_of(found_.begin(), found_.end(), [](char found) { return found != 0; }))
     return false;
   return roots < roots_max * problem_->goals.size() &&
-         attempt_ < goals * (roots == 0 ? attempts_for_one : attempts_max);
+         (in_batch() || attempts_ < goals * (roots == 0 ? attempts_for_one : attempts_max));
 }
 
 bool Roots::attempt(Query& query, Rng& rng, Root& root) {
-  const std::size_t goals = problem_->goals.size();
-  const auto which = static_cast<std::size_t>(attempt_) % goals;
-  const int attempt = attempt_++ / static_cast<int>(goals);
-  if (found_[which] != 0) return false;
+  if (in_batch()) return at_tip(query, root);
+  const std::size_t which = goal_;
   const scene::Goal& goal = problem_->goals[which];
-  if (goal.type != scene::GoalType::joint) return at_tip(goal, attempt, query, rng, root);
-  found_[which] = at_joints(goal, attempt, query, rng, root) ? 1 : 0;
-  return found_[which] != 0;
+  const bool joint = goal.type == scene::GoalType::joint;
+  bool found = false;
+  if (joint && found_[which] == 0) {
+    found = at_joints(goal, query, rng, root);
+    found_[which] = found ? 1 : 0;
+  }
+  if (!joint) begin_batch(goal, rng);
+  attempts_ += joint ? 1 : kernel::lanes;
+  if (++goal_ == problem_->goals.size()) {
+    goal_ = 0;
+    ++rounds_;
+  }
+  return found;
 }
 
-bool Roots::at_joints(const scene::Goal& goal, int attempt, Query& query, Rng& rng,
-                      Root& root) const {
+bool Roots::at_joints(const scene::Goal& goal, Query& query, Rng& rng, Root& root) const {
   root.q = goal.q;
-  if (attempt > 0)  // the goal itself is not clear, but a place within its tolerance may be
+  if (rounds_ > 0)  // the goal itself is not clear, but a place within its tolerance may be
     for (double& x : root.q)
       x += joint_tolerance_share * goal.tolerance_rad * rng.uniform(-1.0, 1.0);
   root.clearance = query.clearance(root.q, settings_.least_m);
   return root.clearance > 0.0 && root.clearance >= settings_.least_m;
 }
 
+// The first posture of all is the start, with the goal itself as its target.
+void Roots::begin_batch(const scene::Goal& goal, Rng& rng) {
+  const dynamics::TipTarget target = tip_target(goal);
+  for (int l = 0; l < kernel::lanes; ++l) {
+    const bool first = rounds_ == 0 && l == 0;
+    targets_[static_cast<std::size_t>(l)] = first ? target : draw_near(target, rng);
+    box_.draw(rng, sample_);
+    q_.col(l) = first ? problem_->start.cwiseMax(box_.lower).cwiseMin(box_.upper) : sample_;
+  }
+  unsigned near = (1U << kernel::lanes) - 1U;
+  if (root_lanes_.fits()) near = root_lanes_.solve(targets_, q_);
+  next_ = 0;
+  ordered_ = 0;
+  std::array<double, kernel::lanes> apart{};
+  for (; near != 0; near &= near - 1U) {
+    const int l = std::countr_zero(near);
+    sample_ = q_.col(l);
+    apart[static_cast<std::size_t>(l)] = weighted_distance(weights_, problem_->start, sample_);
+    order_[static_cast<std::size_t>(ordered_++)] = l;
+  }
+  std::sort(order_.begin(), order_.begin() + ordered_, [&](int a, int b) {
+    const double x = apart[static_cast<std::size_t>(a)], y = apart[static_cast<std::size_t>(b)];
+    return x < y || (x == y && a < b);
+  });
+}
+
 // Most attempts look for places with all the clearance that is asked for, the last quarter for any
 // that a path may end at.
-double Roots::clearance_of_attempt(int attempt) const noexcept {
-  const int quarter = 4 * attempt / attempts_max;
+double Roots::least_clearance() const noexcept {
+  const int quarter = 4 * (rounds_ - 1) * kernel::lanes / attempts_max;
   if (quarter < 2) return settings_.root_clearance_m;
   return quarter == 2 ? 0.5 * (settings_.root_clearance_m + settings_.least_m) : settings_.least_m;
 }
 
-bool Roots::at_tip(const scene::Goal& goal, int attempt, Query& query, Rng& rng, Root& root) {
-  const dynamics::TipTarget target = tip_target(goal);
-  const bool reaches = kinematics_.solve(attempt > 0 ? draw_near(target, rng) : target, q_);
-  if (reaches) {
-    const double least = std::max(1e-6, clearance_of_attempt(attempt));
-    root.q = q_;
-    root.clearance = query.clearance(q_, least);
-    box_.draw(rng, q_);
-    return root.clearance >= least;
-  }
-  box_.draw(rng, q_);
-  return false;
+bool Roots::at_tip(Query& query, Root& root) {
+  const int lane = order_[static_cast<std::size_t>(next_++)];
+  sample_ = q_.col(lane);
+  if (!kinematics_.solve(targets_[static_cast<std::size_t>(lane)], sample_)) return false;
+  const double least = std::max(1e-6, least_clearance());
+  root.q = sample_;
+  root.clearance = query.clearance(root.q, least);
+  return root.clearance >= least;
 }
 
 }  // namespace hamelin::search

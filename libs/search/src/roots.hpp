@@ -1,11 +1,12 @@
 #pragma once
 #include <Eigen/Core>
-#include <span>
+#include <array>
 #include <vector>
 
 #include "hamelin/core/rng.hpp"
 #include "hamelin/dynamics/inverse_kinematics.hpp"
 #include "hamelin/search/search.hpp"
+#include "root_lanes.hpp"
 
 namespace hamelin::search {
 
@@ -16,32 +17,42 @@ struct Root {
 };
 
 /// Finds configurations within the tolerances of goals, one attempt after the other: a search
-/// begins with the first root, and others join it later. docs/theory.md, chapter 17
+/// begins with the first root, and others join it later. Goals of the tip are tried in batches of
+/// postures, those near the start first. docs/theory.md, chapter 17
 class Roots {
  public:
   /// All must outlive this.
-  Roots(const model::Model& model, const dynamics::JointBox& box, const Settings& settings);
+  Roots(const model::Model& model, const dynamics::JointBox& box, const Settings& settings,
+        const Eigen::VectorXd& weights);
 
   void begin(const Problem& problem);
   /// Whether more attempts are worth while, with so many roots.
   [[nodiscard]] bool tries(std::size_t roots) const noexcept;
+  /// Whether the next attempt is one more of a batch.
+  [[nodiscard]] bool in_batch() const noexcept { return next_ < ordered_; }
   /// @param root receives a clear one, with clearance above 0 @return whether there is one
   [[nodiscard]] bool attempt(Query& query, Rng& rng, Root& root);
 
  private:
-  [[nodiscard]] bool at_joints(const scene::Goal& goal, int attempt, Query& query, Rng& rng,
-                               Root& root) const;
-  [[nodiscard]] bool at_tip(const scene::Goal& goal, int attempt, Query& query, Rng& rng,
-                            Root& root);
-  [[nodiscard]] double clearance_of_attempt(int attempt) const noexcept;
+  [[nodiscard]] bool at_joints(const scene::Goal& goal, Query& query, Rng& rng, Root& root) const;
+  void begin_batch(const scene::Goal& goal, Rng& rng);
+  [[nodiscard]] bool at_tip(Query& query, Root& root);
+  [[nodiscard]] double least_clearance() const noexcept;
 
   const dynamics::JointBox& box_;
   const Settings& settings_;
+  const Eigen::VectorXd& weights_;
+  RootLanes root_lanes_;
   dynamics::InverseKinematics kinematics_;
   const Problem* problem_ = nullptr;
-  Eigen::VectorXd q_;
-  std::vector<char> found_;  ///< joint goals that need no other root
-  int attempt_ = 0;
+  std::vector<char> found_;        ///< joint goals that need no other root
+  std::size_t goal_ = 0;           ///< of the next batch
+  int attempts_ = 0, rounds_ = 0;  ///< of all goals; and how often each had its turn
+  RootLanes::Targets targets_;
+  Eigen::MatrixXd q_;                     ///< the batch
+  std::array<int, kernel::lanes> order_;  ///< its postures that are worth an attempt
+  int next_ = 0, ordered_ = 0;
+  Eigen::VectorXd sample_;
 };
 
 }  // namespace hamelin::search

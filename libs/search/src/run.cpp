@@ -32,7 +32,7 @@ constexpr std::size_t nodes = 4096;
 struct Attempt {
   double share, used;
 };
-constexpr std::array<Attempt, 3> attempts{{{1.0, 0.1}, {0.5, 0.3}, {0.1, 1.0}}};
+constexpr std::array<Attempt, 3> attempts{{{1.0, 0.005}, {0.5, 0.05}, {0.1, 1.0}}};
 
 }  // namespace
 
@@ -41,7 +41,7 @@ Search::Run::Run(const model::Model& model, const Settings& settings)
       weights_(joint_weights(model)),
       box_(model.dof(), settings.q_lower, settings.q_upper, limit_reserve),
       bounds_(box_),
-      finder_(model, box_, settings_),
+      finder_(model, box_, settings_, weights_),
       shortening_(model.dof()),
       from_start_(weights_, nodes),
       from_goal_(weights_, nodes),
@@ -141,7 +141,9 @@ void Search::Run::try_straight() {
 void Search::Run::look_for_roots() {
   next_root_ = used() + root_checks;
   Root root;
-  if (!finder_.attempt(*query_, rng_, root)) return;
+  bool found = finder_.attempt(*query_, rng_, root);
+  while (!found && finder_.in_batch()) found = finder_.attempt(*query_, rng_, root);
+  if (!found) return;
   add_root(root);
   set_margins();
   phase_ = Phase::straight;
@@ -156,8 +158,8 @@ void Search::Run::draw() {
   const auto k = static_cast<std::size_t>(rng_.below(roots_.size() + 1));
   const VectorXd& center = k < roots_.size() ? roots_[k].q : problem_.start;
   for (Index j = 0; j < sample_.size(); ++j)
-    sample_[j] = std::clamp(center[j] + near_spread / weights_[j] * rng_.normal(),
-                            bounds_.lower[j], bounds_.upper[j]);
+    sample_[j] = std::clamp(center[j] + near_spread / weights_[j] * rng_.normal(), bounds_.lower[j],
+                            bounds_.upper[j]);
 }
 
 // The smaller tree grows towards a sample.

@@ -34,7 +34,7 @@ constexpr double path_end_reached = 0.1;
 // An arm that is kept from its target, farther than so far [m and ½ rad], for so long and up to
 // this share of the desired motion, asks for a way to it, and if there was none, again soon: the
 // target moves on. To a target that rests it asks a few times.
-constexpr double target_away = 0.06, target_blocked_s = 0.3, target_again_s = 0.3,
+constexpr double target_away = 0.06, target_blocked_s = 0.2, target_again_s = 0.2,
                  target_blocked_share = 0.3;
 constexpr int target_searches = 3;
 // An arm so near to the reference of a trajectory tracks it [rad or m], unless its clock hardly

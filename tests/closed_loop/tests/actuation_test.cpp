@@ -163,7 +163,7 @@ TEST_CASE("with exact positions an estimated velocity is as good as a measured o
   const TemporaryFolder folder;
   Json scene = scene_of({{"torque", {9.0, -4.0, 12.0, 1.0}}}, "sampled");
   scene["actuation"]["delay_s"] = GENERATE(0.0, 0.003);
-  scene["planner"] = {{"name", "hybrid"}, {"guide", {{"type", "none"}}}};
+  scene["planner"] = {{"name", "hybrid"}, {"guide", "none"}};
   scene["goals"] = {{{"type", "joint"}, {"q", {0.4, -0.3, 0.5, 0.2}}}};
   scene["duration_s"] = 0.6;
   const auto measured = run_scene(folder, scene);

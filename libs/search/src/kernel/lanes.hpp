@@ -4,8 +4,8 @@
 #include <immintrin.h>
 #endif
 
+#include "chain.hpp"
 #include "hamelin/geometry/small.hpp"
-#include "line_lanes.hpp"
 
 #ifndef HAMELIN_ISA_NAMESPACE
 #define HAMELIN_ISA_NAMESPACE isa_baseline

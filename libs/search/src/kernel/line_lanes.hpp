@@ -1,24 +1,17 @@
 #pragma once
 #include <cstdint>
 
+#include "chain.hpp"
+
 namespace hamelin::search::kernel {
 
-/// Postures or pieces of a line that are examined at once, on every instruction set.
-inline constexpr int lanes = 16;
 /// What more than this of anything has is checked exactly.
-inline constexpr int joints_max = 16, parts_max = 64, spheres_max = 512, pairs_max = 256,
-                     primitives_max = 64, places_max = 32;
+inline constexpr int parts_max = 64, spheres_max = 512, pairs_max = 256, primitives_max = 64,
+                     places_max = 32;
 inline constexpr int sphere_words = spheres_max / 64, pair_words = pairs_max / 64;
 
-/// Constants of one joint, as those of model::SpatialLink. All lengths in metres, in single
-/// precision; all points in the frame of the check, see LineCheck, unless stated otherwise.
-struct Joint {
-  float cos_alpha, sin_alpha;
-  float p[3];          ///< of the frame in that of the link before
-  float slide[3];      ///< direction of a prismatic joint, in the frame of the link before
-  float turn;          ///< ±1 about the frame's z; zero if prismatic
-  float sine, cosine;  ///< of the constant angle of a prismatic joint
-};
+// All lengths are in metres, in single precision, and all points in the frame of the check, see
+// LineCheck, unless stated otherwise.
 
 /// A sphere that holds a shape or a piece of one, in the frame of its link.
 struct Sphere {
@@ -40,12 +33,11 @@ struct Pair {
 };
 
 struct Arm {
-  int dof, part_count, pair_count;
-  const Joint* joints;
+  Chain chain;
+  int part_count, pair_count;
   const Part* parts;  ///< those that move come first, from the tip to the base
   const Sphere* spheres;
   const Pair* pairs;
-  float root_p[3], root_x[3], root_y[3], root_z[3];
 };
 
 /// An obstacle: a box with rounded edges, or a cylinder about its local z.

@@ -2,7 +2,7 @@
 // same bits.
 #include "line_lanes.hpp"
 
-#include "lanes.hpp"
+#include "frames.hpp"
 
 namespace hamelin::search::kernel {
 inline namespace HAMELIN_ISA_NAMESPACE {
@@ -11,50 +11,29 @@ namespace {
 
 /// Frame of a link, its angular velocity w per unit of s, and the velocity v of its point at the
 /// origin.
-struct Pose {
-  Point x, y, z, p, w, v;
+struct Pose : Frame {
+  Point w, v;
 };
 static_assert(sizeof(Pose) == sizeof(float) * Scratch::pose_floats);
 
-HAMELIN_INLINE Point combine(const Pose& f, const float* c) {
-  return f.x * c[0] + f.y * c[1] + f.z * c[2];
-}
-HAMELIN_INLINE Point transform(const Pose& f, const float* c) {
-  return f.p + combine(f, c);
-}
 HAMELIN_INLINE Reals speed(const Pose& f, const Point& p) {
   return sqrt(square(f.v + cross(f.w, p)));
 }
 
-HAMELIN_INLINE void turn_frame(Pose& f, const Joint& joint, const Reals& sine,
-                               const Reals& cosine) {
-  const Point y = f.y * joint.cos_alpha + f.z * joint.sin_alpha;
-  f.z = f.z * joint.cos_alpha - f.y * joint.sin_alpha;
-  f.y = y * cosine - f.x * sine;
-  f.x = f.x * cosine + y * sine;
-}
-
 // Poses of all links at q = start + s step, with their velocities: (17.10).
-void place_links(const Arm& arm, const Line& line, const Batch& batch, Scratch& scratch) {
+void place_links(const Chain& chain, const Line& line, const Batch& batch, Scratch& scratch) {
   const Reals s = load(batch.s);
   const float zero[3] = {};
-  Pose f{splat(arm.root_x), splat(arm.root_y), splat(arm.root_z),
-         splat(arm.root_p), splat(zero),       splat(zero)};
-  for (int j = 0; j < arm.dof; ++j) {
-    const Joint& joint = arm.joints[j];
-    const Reals q = s * line.step[j] + line.start[j];
-    f.p = transform(f, joint.p);
+  Pose f{root_frame(chain), splat(zero), splat(zero)};
+  for (int j = 0; j < chain.dof; ++j) {
+    const Joint& joint = chain.joints[j];
+    const float step = line.step[j];
+    const Point axis = next_frame(f, joint, s * step + line.start[j]);
     if (joint.turn == 0.0F) {
-      const Point direction = combine(f, joint.slide);
-      f.p = f.p + direction * q;
-      f.v = f.v + direction * line.step[j];
-      turn_frame(f, joint, splat(joint.sine), splat(joint.cosine));
+      f.v = f.v + axis * step;
     } else {
-      Reals sine, cosine;
-      sincos(q, sine, cosine);
-      turn_frame(f, joint, sine, cosine);
-      f.w = f.w + f.z * line.step[j];
-      f.v = f.v + cross(f.p, f.z) * line.step[j];
+      f.w = f.w + axis * step;
+      f.v = f.v + cross(f.p, axis) * step;
     }
     __builtin_memcpy(scratch.poses[j], &f, sizeof f);
   }
@@ -179,7 +158,7 @@ class Check {
   HAMELIN_INLINE bool run() {
     ++scratch_.batch;
     scratch_.open_count = 0;
-    place_links(arm_, line_, batch_, scratch_);
+    place_links(arm_.chain, line_, batch_, scratch_);
     set_margins();
     if (all() && !check_hot()) return false;
     for (int part = 0; part < arm_.part_count && arm_.parts[part].link >= 0; ++part)
@@ -221,7 +200,7 @@ class Check {
     for (int k = 0; k < line_.place_count; ++k) {
       const Place& place = line_.places[k];
       Reals sum = splat(0.0F);
-      for (int j = 0; j < arm_.dof; ++j) {
+      for (int j = 0; j < arm_.chain.dof; ++j) {
         const Reals x = s * line_.weighted_step[j] + place.apart[j];
         sum = sum + x * x;
       }

@@ -13,7 +13,7 @@
 namespace hamelin::reactive {
 
 struct FieldDriveParams {
-  double cruise_speed;  ///< largest joint speed of the attraction [rad/s or m/s]
+  double cruise_speed;  ///< of the fastest joint, by the attraction [rad/s or m/s]
   double range_m;       ///< near points are listed up to this distance
 };
 

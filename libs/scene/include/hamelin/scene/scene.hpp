@@ -204,7 +204,7 @@ struct GuideSpec {
   /// planner's margin.
   std::optional<double> margin_m;
   long checks_max = 200000;  ///< after which a search ends without a path
-  long improve_checks = 0;   ///< for which a path is improved after it was found
+  long improve_checks = 2000;  ///< for which a path is improved after it was found
   int searches_max = 5;      ///< of a goal, after stalls
   /// Simulated time that a check takes [s]. With real time nothing is charged.
   double check_time_s = 2e-6;

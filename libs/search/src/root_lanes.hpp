@@ -1,0 +1,41 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "hamelin/dynamics/inverse_kinematics.hpp"
+#include "kernel/root_lanes.hpp"
+
+namespace hamelin::search {
+
+/// Inverse kinematics of sixteen postures at once, in single precision: brings them near to their
+/// targets, and dynamics::InverseKinematics takes them the rest of the way.
+class RootLanes {
+ public:
+  using Targets = std::array<dynamics::TipTarget, kernel::lanes>;
+
+  /// Both must outlive this.
+  RootLanes(const model::Model& model, const dynamics::JointBox& box);
+
+  /// Whether the lanes have room for the arm and its joint limits.
+  [[nodiscard]] bool fits() const noexcept { return fits_; }
+  /// @param targets in the world, all with the tolerances and `turns` of the first
+  /// @param q dof × lanes, in the box. Those of joints behind the tip stay
+  /// @return bits of the postures that came near to their targets
+  [[nodiscard]] unsigned solve(const Targets& targets, Eigen::MatrixXd& q);
+
+ private:
+  void set_targets(const Targets& targets);
+
+  const model::Model& model_;
+  const dynamics::JointBox& box_;
+  const kernel::RootKernels& kernels_;
+  std::vector<kernel::Joint> joints_;
+  kernel::Chain chain_{};
+  std::unique_ptr<kernel::RootTargets> targets_;
+  std::unique_ptr<kernel::RootPostures> postures_;
+  bool fits_;
+};
+
+}  // namespace hamelin::search
