@@ -191,6 +191,7 @@ py::dict goal_dict(const hamelin_goal& goal, std::size_t dof) {
         new_array({static_cast<py::ssize_t>(goal.path_points), static_cast<py::ssize_t>(dof)});
     std::memcpy(path.mutable_data(), goal.path, sizeof(double) * goal.path_points * dof);
     out["path"] = path;
+    if (goal.path_margin_m > 0.0) out["path_margin_m"] = goal.path_margin_m;
   }
   static constexpr std::array<const char*, 4> searches{"not sought", "sought", "found",
                                                        "not found"};
@@ -306,9 +307,10 @@ struct PySetup : Whole {
   // Services of the host, which belong to the thread of the planner's calls.
   [[nodiscard]] const Host& services() const {
     if (host == nullptr || thread != std::this_thread::get_id())
-      throw Error(ErrorCode::usage,
-                  "PlannerSetup: log(), warn(), declare_series(), draw_path() and request_path() are "
-                  "used outside of the planner's calls, expected in start() or tick()");
+      throw Error(
+          ErrorCode::usage,
+          "PlannerSetup: log(), warn(), declare_series(), draw_path() and request_path() are "
+          "used outside of the planner's calls, expected in start() or tick()");
     return *host;
   }
 };
@@ -591,9 +593,11 @@ void add_tick(py::module_& module) {
           "Joint velocities, shape (n,) [rad/s or m/s], as q.")
       .def_property_readonly(
           "goal", [](const PyTick& t) { return goal_dict(t.get().goal(), t.dof); },
-          "The current goal as a dict: type, tolerances, path, path_search (\"not sought\",\n"
-          "\"sought\", \"found\", \"not found\"), and q or position_m, quaternion_wxyz,\n"
-          "velocity_m_s, angular_velocity_rad_s; a copy.")
+          "The current goal as a dict: type, tolerances, path, path_margin_m (its clearance away\n"
+          "from its ends, if it was searched), path_search (\"not sought\", \"sought\", "
+          "\"found\",\n"
+          "\"not found\"), and q or position_m, quaternion_wxyz, velocity_m_s,\n"
+          "angular_velocity_rad_s; a copy.")
       .def_property_readonly(
           "goal_number", [](const PyTick& t) { return t.get().goal_number(); },
           "Another number means another goal.")
@@ -757,7 +761,8 @@ void add_setup(py::module_& module) {
            "Draws a line of points of the world, shape (N, 3) [m], for log and report; in tick().")
       .def(
           "request_path", [](const PySetup& s) { return s.services().request_path(); },
-          "Asks for a collision-free path to the current goal; in tick(). Returns whether one will\n"
+          "Asks for a collision-free path to the current goal; in tick(). Returns whether one "
+          "will\n"
           "be searched. Later ticks have another goal: at first one where the arm waits, then one\n"
           "with the path, or the goal itself if none was found; goal[\"path_search\"] says which.")
       .def("clearance", &setup_clearance, arg("q"), py::kw_only(), arg("time_ahead") = 0.0,

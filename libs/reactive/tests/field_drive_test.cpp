@@ -115,7 +115,7 @@ TEST_CASE("far from the goal the attraction has the cruise speed and a bounded a
   const VectorXd direction = arm.to.normalized();
   CHECK(arm.drive.acceleration().cwiseAbs().maxCoeff() == Approx(10.0));
   CHECK((arm.drive.acceleration().normalized() - direction).norm() < 1e-12);
-  arm.v = 2.0 * direction;  // the cruise speed, in the norm of all joints
+  arm.v = arm.to * (2.0 / 3.0);  // the first joint has the cruise speed
   arm.update();
   CHECK(arm.drive.acceleration().norm() < 1e-12);
   CHECK(arm.drive.goal_factor() == 1.0);
@@ -131,7 +131,7 @@ TEST_CASE("far from the goal the attraction has the cruise speed and a bounded a
 TEST_CASE("the scene's speed scale slows the attraction", "[reactive][field_drive]") {
   Driven arm(robot4, free_setup());
   arm.to << 3.0, -2.0, 1.0, 0.5;
-  arm.v = 0.5 * arm.to.normalized();
+  arm.v = arm.to * (0.5 / 3.0);
   arm.update();
   arm.input.speed_scale = 0.25;
   arm.drive.update(planning::Tick(arm.input, 4));

@@ -20,6 +20,8 @@ class Margins {
     start_.q = goal_.q = Eigen::VectorXd::Zero(dof);
   }
 
+  /// @param full_m away from tight places, at most the range
+  void set_full(double full_m) { full_ = std::clamp(full_m, least_, range_); }
   template <class Vector>
   void set_goal(const Vector& q, double clearance_m) {
     goal_.q = q;

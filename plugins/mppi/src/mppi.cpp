@@ -31,6 +31,7 @@ constexpr double limit_reserve = 1e-3, limit_reserve_sampled = 0.02;
 // come about a millimetre nearer [m].
 constexpr double least_m = 0.001, least_sampled_m = 0.003;
 constexpr double beyond_shield_m = 0.002;
+constexpr double beside_path_m = 0.002;  // of a path's margin, left to plans beside it
 // A joint that strays farther from its planned motion is not followed but planned for from where it
 // is [rad or m].
 constexpr double stray = 0.03;
@@ -128,11 +129,24 @@ class Mppi final : public planning::Planner {
  private:
   enum Figure { plan_cost, mean_cost, effective_samples, plan_clearance, colliding };
 
+  static double least_full_margin(const planning::Setup& setup) {
+    return std::max(setup.shield_margin_m(), setup.shield_self_margin_m()) + beyond_shield_m;
+  }
+  static double full_margin(const planning::Setup& setup, const Json& params) {
+    return std::max(params["margin_m"].get<double>(), least_full_margin(setup));
+  }
   static Margins make_margins(const planning::Setup& setup, const Json& params) {
-    const double shield = std::max(setup.shield_margin_m(), setup.shield_self_margin_m());
-    return {setup.dof(), std::max(params["margin_m"].get<double>(), shield + beyond_shield_m),
-            setup.sampled() ? least_sampled_m : least_m, params["goal_margin_m"],
-            params["clearance_range_m"]};
+    return {setup.dof(), full_margin(setup, params), setup.sampled() ? least_sampled_m : least_m,
+            params["goal_margin_m"], params["clearance_range_m"]};
+  }
+  // Where a path could not keep the full margin, plans cannot either.
+  void set_full_margin(const hamelin_goal& goal) {
+    const double of_path =
+        HAMELIN_HAS_FIELD(&goal, hamelin_goal, path_margin_m) ? goal.path_margin_m : 0.0;
+    const double full = full_margin(setup_, initial_params_);
+    task_.margins.set_full(
+        of_path > 0.0 ? std::min(full, std::max(least_full_margin(setup_), of_path - beside_path_m))
+                      : full);
   }
   static double reserve(const planning::Setup& setup) {
     return setup.sampled() ? limit_reserve_sampled : limit_reserve;
@@ -238,6 +252,7 @@ class Mppi final : public planning::Planner {
     gives_up_ = false;
     waits_ = false;
     task_.tip_cost = false;
+    set_full_margin(from);
     const auto way_points = setup_.path(from);
     if (way_points.cols() > 1) return follow_way_points(way_points);
     const std::int32_t path_search = HAMELIN_HAS_FIELD(&from, hamelin_goal, path_search)

@@ -114,6 +114,7 @@ Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
   if (answer.path.found() && answer.path.points.cols() <= path_.cols()) {
     ++figures_.found;
     figures_.length = answer.path.length;
+    margin_m_ = answer.path.margin_m;
     set_path(now, answer.path.points);
     return News::path;
   }
@@ -181,6 +182,7 @@ void Guidance::show(const Now& now, Index first, Index count) {
   if (!follows_paths_ || count == 1) return;
   shown_.path = path_.col(first).data();
   shown_.path_points = static_cast<std::size_t>(count);
+  shown_.path_margin_m = margin_m_;
 }
 
 void Guidance::tell(hamelin_goal& goal) const noexcept {
@@ -191,6 +193,7 @@ void Guidance::tell(hamelin_goal& goal) const noexcept {
   if (mode_ != Mode::guided) return;
   goal.path = shown_.path;
   goal.path_points = shown_.path_points;
+  goal.path_margin_m = margin_m_;
 }
 
 void Guidance::show_next_point(const Now& now) {

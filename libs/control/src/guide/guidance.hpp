@@ -84,6 +84,7 @@ class Guidance {
   Mode mode_ = Mode::off;
   Eigen::MatrixXd path_;
   Eigen::Index count_ = 0;  ///< way-points of the path
+  double margin_m_ = 0.0;   ///< that it keeps
   Eigen::Index point_ = 0;  ///< that is shown to a planner that follows none
   hamelin_goal shown_{};
   std::uint64_t number_ = 0, goal_number_ = 0;

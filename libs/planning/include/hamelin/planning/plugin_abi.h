@@ -171,6 +171,8 @@ typedef struct hamelin_goal {
   double reference_rate;
   /* HAMELIN_PATH_NOT_SOUGHT, ...: see hamelin_host.request_path. */
   int32_t path_search;
+  /* The clearance that a path which was searched keeps away from its ends [m]; 0: not known. */
+  double path_margin_m;
 } hamelin_goal;
 
 /* A gyroscopic term: the force w x (velocity of the point) acts at a point of a link. It does no

@@ -24,11 +24,12 @@ class Turner {
   /// Turns u, which is brought to the cruise speed before and does not pass it afterwards.
   /// @param G metric, the mass matrix
   void apply(const Turn& turn, const Eigen::MatrixXd& G, double cruise_speed, Eigen::VectorXd& u) {
-    const double speed = u.norm();
+    const double speed = u.lpNorm<Eigen::Infinity>();
     if (!(speed > 1e-9)) return;
     u *= cruise_speed / speed;
     rotate(turn, G, u);
-    if (const double turned = u.norm(); turned > cruise_speed) u *= cruise_speed / turned;
+    const double turned = u.lpNorm<Eigen::Infinity>();
+    if (turned > cruise_speed) u *= cruise_speed / turned;
   }
   /// The turn alone: u' has the energy of u.
   void rotate(const Turn& turn, const Eigen::MatrixXd& G, Eigen::VectorXd& u) {
