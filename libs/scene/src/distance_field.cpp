@@ -18,6 +18,7 @@ namespace {
 
 constexpr int cap = DistanceField::cap_voxels;
 constexpr double unit_voxels = cap / 65535.0;  // of stored distances
+constexpr double bound_rounding = 1e-9;        // in voxels
 constexpr std::size_t padding = 2;             // values behind the last one, for wide loads
 
 bool is_empty(const VoxelBox& box) {
@@ -380,36 +381,72 @@ DistanceField::View DistanceField::view() const noexcept {
 }
 
 // docs/theory.md (17.7)–(17.9)
-double DistanceField::lower_bound(const Eigen::Vector3d& p) const {
-  if (empty()) return resolution_ > 0.0 ? cap_m() : std::numeric_limits<double>::infinity();
-  std::array<std::int32_t, 3> node{}, low{};
-  std::array<double, 3> t{};
-  double apart = 0.0, bend = 0.0;
+// The place of a point among the nodes, moved into their box: (17.9).
+struct DistanceField::Place {
+  std::array<std::int32_t, 3> low{};  ///< the cell's first node
+  std::array<double, 3> t{};          ///< coordinates in the cell
+};
+
+DistanceField::Place DistanceField::place(const Eigen::Vector3d& p) const noexcept {
+  Place out;
   for (std::size_t i = 0; i < 3; ++i) {
-    const double first = nodes_.lo[i], last = nodes_.hi[i] - 1;
-    const double at = std::clamp(p[static_cast<Eigen::Index>(i)] / resolution_, first, last);
-    node[i] = static_cast<std::int32_t>(std::lround(at));
-    low[i] = static_cast<std::int32_t>(std::min(std::floor(at), last - 1.0));
-    t[i] = at - low[i];
-    apart += (at - node[i]) * (at - node[i]);
-    bend += t[i] * (1.0 - t[i]);
+    const double last = nodes_.hi[i] - 1 - nodes_.lo[i];
+    const double at =
+        std::clamp(p[static_cast<Eigen::Index>(i)] / resolution_ - nodes_.lo[i], 0.0, last);
+    const auto low = static_cast<std::int32_t>(std::min(at, last - 1.0));
+    out.low[i] = nodes_.lo[i] + low;
+    out.t[i] = at - low;
   }
-  const auto value = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
-    return unit_voxels * static_cast<double>(values_[index(x, y, z)]);
-  };
-  double bound = value(node[0], node[1], node[2]) - std::sqrt(apart);
+  return out;
+}
+
+// (17.7) in voxels
+double DistanceField::bound_by_node(const Place& at) const noexcept {
+  std::array<std::int32_t, 3> node{};
+  double apart = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const bool next = at.t[i] >= 0.5;
+    node[i] = at.low[i] + (next ? 1 : 0);
+    const double off = next ? 1.0 - at.t[i] : at.t[i];
+    apart += off * off;
+  }
+  return unit_voxels * static_cast<double>(values_[index(node[0], node[1], node[2])]) -
+         std::sqrt(apart);
+}
+
+// (17.8) in voxels, or −1 where a voxel is too near
+double DistanceField::bound_by_cell(const Place& at) const noexcept {
+  const auto& t = at.t;
   double least = cap, interpolated = 0.0;
   for (std::int32_t corner = 0; corner < 8; ++corner) {
     const std::int32_t x = corner & 1, y = (corner >> 1) & 1, z = corner >> 2;
-    const double at = value(low[0] + x, low[1] + y, low[2] + z);
-    least = std::min(least, at);
-    interpolated += at * (x != 0 ? t[0] : 1.0 - t[0]) * (y != 0 ? t[1] : 1.0 - t[1]) *
+    const double value =
+        unit_voxels *
+        static_cast<double>(values_[index(at.low[0] + x, at.low[1] + y, at.low[2] + z)]);
+    least = std::min(least, value);
+    interpolated += value * (x != 0 ? t[0] : 1.0 - t[0]) * (y != 0 ? t[1] : 1.0 - t[1]) *
                     (z != 0 ? t[2] : 1.0 - t[2]);
   }
-  constexpr double half_diagonal = 0.8660254037844388, least_delta = 0.3, rounding = 1e-9;
+  constexpr double half_diagonal = 0.8660254037844388, least_delta = 0.3;
   const double delta = least - half_diagonal;
-  if (delta > least_delta) bound = std::max(bound, interpolated - 0.5 * bend / delta);
-  return std::max(0.0, bound - rounding) * resolution_;
+  if (!(delta > least_delta)) return -1.0;
+  const double bend = t[0] * (1.0 - t[0]) + t[1] * (1.0 - t[1]) + t[2] * (1.0 - t[2]);
+  return interpolated - 0.5 * bend / delta;
+}
+
+double DistanceField::lower_bound(const Eigen::Vector3d& p) const {
+  if (empty()) return resolution_ > 0.0 ? cap_m() : std::numeric_limits<double>::infinity();
+  const Place at = place(p);
+  return std::max(0.0, std::max(bound_by_node(at), bound_by_cell(at)) - bound_rounding) *
+         resolution_;
+}
+
+bool DistanceField::is_farther(const Eigen::Vector3d& p, double limit_m) const {
+  if (empty()) return lower_bound(p) > limit_m;
+  const double limit = limit_m / resolution_ + 2.0 * bound_rounding;
+  if (limit >= cap) return false;
+  const Place at = place(p);
+  return bound_by_node(at) > limit || bound_by_cell(at) > limit;
 }
 
 }  // namespace hamelin::scene

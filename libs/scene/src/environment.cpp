@@ -335,6 +335,7 @@ double Environment::clearance(const Shapes& arm, const Moment& moment, double li
   double smallest = limit;
   BoxHit hit;
   SegmentHit axis_hit;
+  const DistanceField* const bounds = field_->made ? field_->field.get() : nullptr;
   const auto consider = [&](const MapField& field) {
     if (field.empty() || view == View::hidden || among == Among::moving) return;
     std::int32_t hint = -1;
@@ -342,7 +343,10 @@ double Environment::clearance(const Shapes& arm, const Moment& moment, double li
       // In contact, smallest + radius may be negative, but a deeper contact may follow: the limit
       // must not be below zero.
       const double near = std::max(0.0, smallest + arm.radii[i]);
-      if (arm.is_capsule(i)) {
+      const double half = arm.is_capsule(i) ? arm.half_axes[i].norm() : 0.0;
+      if (bounds != nullptr && bounds->is_farther(map_pose_inverse_ * arm.centers[i], near + half))
+        continue;
+      if (half > 0.0) {
         if (!field.nearest(map_pose_inverse_ * arm.from(i), map_pose_inverse_ * arm.to(i), near,
                            axis_hit, hint))
           continue;

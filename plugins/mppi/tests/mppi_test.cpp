@@ -102,8 +102,10 @@ TEST_CASE("mppi reaches goals of each type in free space", "[mppi]") {
 }
 
 TEST_CASE("mppi goes around an obstacle that blocks the straight way", "[mppi]") {
-  // The straight motion sweeps the stretched arm through the ball.
-  Json scene = planar_scene(joint_goal({1.2, 0.0, 0.0, 0.0}), Json::array({ball(2.6, 1.6, 0.3)}));
+  // The straight motion sweeps the arm through the ball.
+  Json scene = arm7_scene(left, joint_goal(right));
+  scene["obstacles"] = Json::array({ball(0.5, 0.0, 0.2)});
+  scene["obstacles"][0]["position_m"][2] = 0.6;
   for (const char* actuation : {"ideal", "sampled"}) {
     scene["actuation"] = {{"type", actuation}};
     const auto result = run(scene);

@@ -66,8 +66,8 @@ search::Settings guide_settings(const scene::Scene& scene, const model::Model& n
   double margin = default_margin_m;
   if (const auto it = params.find("margin_m"); it != params.end() && it->is_number())
     margin = it->get<double>();
-  out.margin_m = scene.guide.margin_m.value_or(std::max({margin, setup.map_resolution_m, shield}) +
-                                               guide_reserve_m);
+  out.margin_m = scene.guide.margin_m.value_or(
+      std::max({margin, setup.map_resolution_m, shield + guide_reserve_m}) + guide_reserve_m);
   out.least_m = std::min(out.margin_m, setup.sampled ? least_sampled_m : least_m);
   out.root_clearance_m = std::max(shield + root_reserve_m, out.margin_m + out.slack_m);
   out.seed = scene.seed;

@@ -67,6 +67,8 @@ class DistanceField {
   /// A lower bound of the distance of a point from all voxels [m]; zero inside of them.
   /// @param p in the map's frame [m]
   [[nodiscard]] double lower_bound(const Eigen::Vector3d& p) const;
+  /// Whether a point is proved to be farther than that from all voxels; mostly by one look-up.
+  [[nodiscard]] bool is_farther(const Eigen::Vector3d& p, double limit_m) const;
   /// The largest distance that it can tell [m].
   [[nodiscard]] double cap_m() const noexcept { return cap_voxels * resolution_; }
 
@@ -94,6 +96,10 @@ class DistanceField {
   void compute_all();
   /// Computes the distances of the nodes within the cap of changed voxels.
   void compute_near(const VoxelBox& changed);
+  struct Place;
+  [[nodiscard]] Place place(const Eigen::Vector3d& p) const noexcept;
+  [[nodiscard]] double bound_by_node(const Place& at) const noexcept;
+  [[nodiscard]] double bound_by_cell(const Place& at) const noexcept;
   [[nodiscard]] std::size_t index(std::int32_t x, std::int32_t y, std::int32_t z) const noexcept {
     return static_cast<std::size_t>(
         (static_cast<std::int64_t>(z - nodes_.lo[2]) * (nodes_.hi[1] - nodes_.lo[1]) + y -
