@@ -55,6 +55,14 @@ void EdgeCheck::place(const VectorXd& q, scene::PlacedShapes& arm) {
   ++checks_;
 }
 
+double EdgeCheck::self_clearance(const VectorXd& q, double most_m) {
+  if (self_ == nullptr) return most_m;
+  place(q, last_);
+  for (std::size_t pair = 0; pair < self_->pairs().size(); ++pair)
+    most_m = std::min(most_m, self_->distance(pair, last_.view(), most_m));
+  return most_m;
+}
+
 bool EdgeCheck::posture_clear(const VectorXd& q, double margin_m, std::span<const int> subjects) {
   place(q, last_);
   return std::all_of(subjects.begin(), subjects.end(),
@@ -62,9 +70,10 @@ bool EdgeCheck::posture_clear(const VectorXd& q, double margin_m, std::span<cons
 }
 
 bool EdgeCheck::keeps_margin(int subject, const scene::Shapes& arm, double margin_m) {
-  if (subject >= shape_count())
-    return self_->distance(at(subject - shape_count()), arm, margin_m + edge_rounding_m) >=
-           margin_m;
+  if (subject >= shape_count()) {
+    const double keep = std::min(margin_m, self_most_ + edge_rounding_m);
+    return self_->distance(at(subject - shape_count()), arm, keep + edge_rounding_m) >= keep;
+  }
   if (!obstacles_) return true;
   const std::size_t shape = at(subject);
   const double radius = arm.radii[shape] + margin_m;
@@ -107,8 +116,10 @@ double EdgeCheck::stray(const Piece& piece, int subject) const {
 }
 
 bool EdgeCheck::proved(const Piece& piece, int subject, const scene::Shapes& middle) {
-  const double keep = margin_ + stray(piece, subject);
-  if (subject >= shape_count())
+  const bool pair = subject >= shape_count();
+  const double keep =
+      (pair ? std::min(margin_, self_most_ + edge_rounding_m) : margin_) + stray(piece, subject);
+  if (pair)
     return self_->distance(at(subject - shape_count()), middle, keep + edge_rounding_m) > keep;
   if (!obstacles_) return true;
   const std::size_t shape = at(subject);

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <span>
 #include <vector>
@@ -116,6 +117,8 @@ class LineCheck::Impl {
 
   void set_margins(const Margins& margins) {
     full_ = margins.full_m();
+    self_most_ = margins.self_most_m();
+    edge_.set_self_most(self_most_);
     for (Index j = 0; j < model_.dof(); ++j) weights_[j] = margins.weight(j);
     const auto& places = margins.places();
     if (place_q_.cols() < static_cast<Index>(places.size()) || place_q_.rows() != model_.dof())
@@ -250,6 +253,7 @@ class LineCheck::Impl {
   bool set_places(const VectorXd& a) {
     kernel::Line& line = *line_;
     line.full_margin = inflated(full_);
+    line.self_most = inflated(self_most_);
     double square = 0.0;
     for (Index j = 0; j < a.size(); ++j) {
       line.weighted_step[j] = static_cast<float>(weights_[j] * dq_[j]);
@@ -399,7 +403,7 @@ class LineCheck::Impl {
   std::vector<Hint> hints_;
   std::vector<kernel::Open> open_;
   std::vector<int> subjects_;
-  double full_ = 0.0;
+  double full_ = 0.0, self_most_ = std::numeric_limits<double>::infinity();
   VectorXd weights_;
   Eigen::MatrixXd place_q_;  // dof × places
   std::vector<PlaceMargin> places_;

@@ -63,6 +63,8 @@ void Search::Run::begin(const Problem& problem, Query& query) {
   phase_ = Phase::first_root;
   start_clearance_ = query.clearance(problem_.start, -1.0);
   if (start_clearance_ <= 0.0) return end("the arm is in contact where it is");
+  const double self = query.self_clearance(problem_.start, settings_.self_margin_m + start_slack_m);
+  self_most_ = std::max(0.0, self - start_slack_m);
   bounds_.lower = bounds_.lower.cwiseMin(problem_.start);
   bounds_.upper = bounds_.upper.cwiseMax(problem_.start);
 }
@@ -114,6 +116,7 @@ void Search::Run::add_root(const Root& root) {
 
 void Search::Run::set_margins() {
   margins_.emplace(attempts[attempt_].share * settings_.margin_m, weights_);
+  margins_->set_self_most(self_most_);
   margins_->add(problem_.start, std::max(0.0, start_clearance_ - start_slack_m), near_start,
                 far_start);
   for (const Root& root : roots_)

@@ -52,7 +52,7 @@ class Search::Run {
   Rng rng_{0};
   Phase phase_ = Phase::ended;
   long before_ = 0;  ///< checks of the query
-  double start_clearance_ = 0.0;
+  double start_clearance_ = 0.0, self_most_ = 0.0;
   std::size_t attempt_ = 0;  ///< of the margins
   std::vector<Root> roots_;
   std::size_t tried_ = 0;  ///< roots to which the straight line was tried

@@ -20,7 +20,8 @@ void check(const model::Model& model, const Settings& settings) {
     if (limits->size() != 0 && limits->size() != model.dof())
       throw Error(ErrorCode::invalid, fmt::format("search: {} joint limits given, expected {}",
                                                   limits->size(), model.dof()));
-  if (!(settings.margin_m >= 0.0) || !(settings.least_m >= 0.0) || settings.checks_max < 1)
+  if (!(settings.margin_m >= 0.0) || !(settings.self_margin_m >= 0.0) ||
+      !(settings.least_m >= 0.0) || settings.checks_max < 1)
     throw Error(ErrorCode::invalid,
                 "search: margins and checks_max: expected margins of at least 0 and 1 check");
 }

@@ -22,6 +22,7 @@ class JointSpaceWorld final : public search::Query {
     ++checks_;
     return distance(q, q);
   }
+  double self_clearance(const Eigen::VectorXd&, double most_m) override { return most_m; }
   void set_margins(const search::Margins& margins) override { margins_ = margins; }
   // Proves a motion as a whole, or its halves where the margins vary.
   bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) override {

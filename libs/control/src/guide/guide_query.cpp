@@ -63,11 +63,16 @@ search::Settings guide_settings(const scene::Scene& scene, const model::Model& n
   out.q_lower = setup.q_lower;
   out.q_upper = setup.q_upper;
   const double shield = std::max(reserve.obstacles_m, reserve.self_m);
-  double margin = default_margin_m;
-  if (const auto it = params.find("margin_m"); it != params.end() && it->is_number())
-    margin = it->get<double>();
+  const auto param = [&](const char* name, double otherwise) {
+    const auto it = params.find(name);
+    return it != params.end() && it->is_number() ? it->get<double>() : otherwise;
+  };
+  const double margin = param("margin_m", default_margin_m);
   out.margin_m = scene.guide.margin_m.value_or(
       std::max({margin, setup.map_resolution_m, shield + guide_reserve_m}) + guide_reserve_m);
+  out.self_margin_m = std::min(
+      out.margin_m,
+      std::max(param("self_margin_m", margin), reserve.self_m + guide_reserve_m) + guide_reserve_m);
   out.least_m = std::min(out.margin_m, setup.sampled ? least_sampled_m : least_m);
   out.root_clearance_m = std::max(shield + root_reserve_m, out.margin_m + out.slack_m);
   out.seed = scene.seed;

@@ -26,6 +26,10 @@ class GuideQuery final : public search::Query {
   std::uint64_t refresh(double time_s);
 
   [[nodiscard]] double clearance(const Eigen::VectorXd& q, double at_least_m) override;
+  [[nodiscard]] double self_clearance(const Eigen::VectorXd& q, double most_m) override {
+    ++clearances_;
+    return edges_.self_clearance(q, most_m);
+  }
   void set_margins(const search::Margins& margins) override { lines_.set_margins(margins); }
   [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) override {
     poll();

@@ -76,7 +76,7 @@ struct Line {
   float kappa[parts_max];                     ///< bounds of (12.5)
   float way[pairs_max];                       ///< Σ L |Δq|, (17.4)
   float speed_slack;                          ///< bound of the rounding of |p'|, (17.14)
-  float full_margin;
+  float full_margin, self_most;               ///< the latter of pairs
   float weighted_step[joints_max], weighted_length, distance_slack;
   int place_count;
   Place places[places_max];

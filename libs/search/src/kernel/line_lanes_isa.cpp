@@ -39,10 +39,11 @@ void place_links(const Chain& chain, const Line& line, const Batch& batch, Scrat
   }
 }
 
-/// A position in a field, in nodes, and what its nearest node says.
+/// A position in a field, in nodes, moved into the box of the nodes, and what its nearest node
+/// says.
 struct Cell {
   Reals f[3];
-  Reals node, apart;  ///< distance of the nearest node [m], and distance from it [m]
+  Reals node;  ///< distance of the nearest node from the map [m]
 };
 
 HAMELIN_INLINE Ints index(const Field& field, const Reals& x, const Reals& y, const Reals& z) {
@@ -89,8 +90,18 @@ HAMELIN_INLINE Reals bound_by_node(const Field& field, const Point& p, Cell& cel
     apart = apart + t * t;
   }
   cell.node = look_up(field, index(field, nearest[0], nearest[1], nearest[2])) * field.unit;
-  cell.apart = sqrt(apart) * field.resolution;
-  return cell.node - cell.apart;
+  return cell.node - sqrt(apart) * field.resolution;
+}
+
+// Of p itself, which may be outside of the box of the nodes, from the nearest node [m].
+HAMELIN_INLINE Reals distance_from_node(const Field& field, const Point& p, const Cell& cell) {
+  const Reals* const at[3] = {&p.x, &p.y, &p.z};
+  Reals apart = splat(0.0F);
+  for (int k = 0; k < 3; ++k) {
+    const Reals t = *at[k] * field.inverse + field.offset[k] - round(cell.f[k]);
+    apart = apart + t * t;
+  }
+  return sqrt(apart) * field.resolution;
 }
 
 // (17.8), or −1 where a voxel is too near
@@ -325,7 +336,7 @@ class Check {
   bool check_near(int part, int index, const Point& c, const Cell& cell, Reals low,
                   const Reals& keep, const Reals& touch, const Reals& stray, unsigned near,
                   unsigned& open) {
-    const Reals high = cell.node + cell.apart + world_.field.unit;
+    const Reals high = cell.node + distance_from_node(world_.field, c, cell) + world_.field.unit;
     if ((below(high, touch) & near) != 0) return reject(part, index);
     low = max(low, bound_by_cell(world_.field, cell));
     const unsigned doubtful = below(low, keep) & near;
@@ -370,8 +381,9 @@ class Check {
     if (need == 0) return true;
     const Pair& pair = arm_.pairs[index];
     const Part &a = arm_.parts[pair.part_a], &b = arm_.parts[pair.part_b];
+    const Reals most = splat(line_.self_most), margin = min(margin_, most);
     const Reals keep =
-        largest_margin_ + (0.5F * batch_.width * line_.way[index] + world_.pair_slack);
+        min(largest_margin_, most) + (0.5F * batch_.width * line_.way[index] + world_.pair_slack);
     const Point ball_b = ball_center(b);
     const Reals both = keep + (a.ball.radius + b.ball.radius);
     need &= below(square(ball_center(a) - ball_b), both * both);
@@ -390,7 +402,7 @@ class Check {
         const Reals far = keep + (sphere.radius + arm_.spheres[j].radius);
         const unsigned near = below(apart, far * far) & inside;
         if (near == 0) continue;
-        const Reals touch = margin_ + (sphere.inner + arm_.spheres[j].inner);
+        const Reals touch = margin + (sphere.inner + arm_.spheres[j].inner);
         if ((below(apart, touch * touch) & near) != 0) return false;
         open |= near;
       }

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -29,6 +30,10 @@ class EdgeCheck {
 
   /// The obstacles of the following checks; must stay until the next call.
   void set_environment(const scene::Environment& environment, double time_s);
+  /// Pairs of parts keep no more than that in the following checks [m].
+  void set_self_most(double most_m) noexcept { self_most_ = most_m; }
+  /// The smallest distance between parts of the arm at q [m], or `most_m` if that is less.
+  [[nodiscard]] double self_clearance(const Eigen::VectorXd& q, double most_m);
   /// Whether all distances are more than the margin on the line from a to b, ends included; false
   /// also if there is no proof.
   [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
@@ -75,6 +80,7 @@ class EdgeCheck {
   scene::Levers levers_;
   const scene::Environment* environment_ = nullptr;
   double time_s_ = 0.0, margin_ = 0.0;
+  double self_most_ = std::numeric_limits<double>::infinity();
   bool obstacles_ = false, movers_ = false;
   std::vector<std::int32_t> hints_;  ///< of each shape, for the map
   std::vector<int> all_;             ///< all subjects

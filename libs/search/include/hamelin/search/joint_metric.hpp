@@ -7,9 +7,9 @@
 
 namespace hamelin::search {
 
-/// The weight of each joint in distances between configurations, docs/theory.md (17.17): by how much
-/// of the arm it moves how far, so that radians and metres may be mixed. It is 1 for a revolute
-/// joint with a long lever.
+/// The weight of each joint in distances between configurations, docs/theory.md (17.17): by how
+/// much of the arm it moves how far, so that radians and metres may be mixed. It is 1 for a
+/// revolute joint with a long lever.
 [[nodiscard]] Eigen::VectorXd joint_weights(const model::Model& model);
 
 /// sqrt(Σ (w_j (a_j − b_j))²); weights of size zero are ones.

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -23,6 +24,9 @@ class Margins {
       : full_(full_m), weights_(std::move(weights)) {}
 
   void clear() noexcept { places_.clear(); }
+  /// Parts of the arm keep no more than that from each other [m].
+  void set_self_most(double most_m) noexcept { self_most_ = most_m; }
+  [[nodiscard]] double self_most_m() const noexcept { return self_most_; }
   /// One whose margin is not less than the full margin has no effect.
   void add(const Eigen::VectorXd& q, double margin_m, double near, double far);
   [[nodiscard]] double full_m() const noexcept { return full_; }
@@ -39,7 +43,7 @@ class Margins {
  private:
   [[nodiscard]] double margin_at(const Place& place, double distance) const;
 
-  double full_;
+  double full_, self_most_ = std::numeric_limits<double>::infinity();
   Eigen::VectorXd weights_;
   std::vector<Place> places_;
 };

@@ -16,8 +16,11 @@ struct Settings {
   /// Joint limits, of size zero where they are not modelled [rad or m].
   Eigen::VectorXd q_lower, q_upper;
   double margin_m = 0.012;  ///< clearance to keep away from the start and goals
-  double least_m = 0.001;   ///< clearance to keep everywhere, if start and goals have it
-  double slack_m = 0.003;   ///< by which the clearance of a tight goal may be undercut near it
+  /// Clearance that parts of the arm keep from each other, at most the margin, and no more than
+  /// they have at the start.
+  double self_margin_m = 0.012;
+  double least_m = 0.001;  ///< clearance to keep everywhere, if start and goals have it
+  double slack_m = 0.003;  ///< by which the clearance of a tight goal may be undercut near it
   double root_clearance_m = 0.0;  ///< clearance of configurations at a goal of the tip, if possible
   long checks_max = 200000;       ///< after which a search ends without a path
   long improve_checks = 0;        ///< for how many checks a path is improved after it was shortened
