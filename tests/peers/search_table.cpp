@@ -14,10 +14,11 @@
 #include "hamelin/core/isa.hpp"
 #include "ompl_search.hpp"
 
-// hamelin_search_peers [--seeds N] [--list] [--ours] SCENE...: searches a path to the first goal of
-// each scene by libs/search, and by OMPL's planners on the same proofs of motions. Prints how many
-// were found, CPU times until the first path and with shortening, checks and lengths. OMPL is given
-// the configuration at which our path ends, and so needs no inverse kinematics.
+// hamelin_search_peers [--seeds N] [--improve N] [--list] [--ours] SCENE...: searches a path to the
+// first goal of each scene by libs/search, and by OMPL's planners on the same proofs of motions.
+// Prints how many were found, CPU times until the first path and with shortening, checks and
+// lengths. OMPL is given the configuration at which our path ends, and so needs no inverse
+// kinematics.
 namespace {
 
 using namespace hamelin;
@@ -80,9 +81,10 @@ void print(const std::string& name, const Figures& f) {
       quantile(f.length, 0.5));
 }
 
-search::Path search_ours(Rig& rig, int seed, bool list, Figures& figures) {
+search::Path search_ours(Rig& rig, int seed, long improve, bool list, Figures& figures) {
   search::Settings settings = rig.settings;
   settings.seed = static_cast<std::uint64_t>(seed);
+  settings.improve_checks = improve;
   search::Search search(rig.arm, settings);
   rig.query.refresh(0.0);
   const long before = rig.query.checks();
@@ -128,12 +130,15 @@ void search_theirs(Rig& rig, const std::string& planner, int seed, const search:
 
 int run(int argc, char** argv) {
   int seeds = 1;
+  long improve = 0;
   bool list = false, only_ours = false;
   std::vector<std::unique_ptr<Rig>> rigs;
   for (int i = 1; i < argc; ++i) {
     const std::string arg = argv[i];
     if (arg == "--seeds" && i + 1 < argc)
       seeds = std::atoi(argv[++i]);
+    else if (arg == "--improve" && i + 1 < argc)
+      improve = std::atol(argv[++i]);
     else if (arg == "--list")
       list = true;
     else if (arg == "--ours")
@@ -147,7 +152,8 @@ int run(int argc, char** argv) {
   Figures ours;
   std::vector<search::Path> paths;
   for (auto& rig : rigs)
-    for (int seed = 1; seed <= seeds; ++seed) paths.push_back(search_ours(*rig, seed, list, ours));
+    for (int seed = 1; seed <= seeds; ++seed)
+      paths.push_back(search_ours(*rig, seed, improve, list, ours));
   print("hamelin", ours);
   if (only_ours) return 0;
   for (const std::string& planner : peers::ompl_planners()) {

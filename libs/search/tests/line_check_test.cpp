@@ -232,6 +232,21 @@ TEST_CASE("lines are proved far from the origin of world and map", "[search][lin
   check(rig, 300, 20);
 }
 
+TEST_CASE("thick links outside of the box of a map's field are not taken for collisions",
+          "[search][line]") {
+  RigOptions options;
+  options.self = options.obstacles = false;
+  options.map = "shelf";
+  model::ChainOptions chain;
+  chain.links = 3;
+  chain.length_m = 0.4;
+  chain.radius_m = 0.25;  // the box ends 0.16 m from the voxels
+  LineRig rig{model::make_chain(chain), options};
+  const Counts counts = compare(rig, 300);
+  CHECK(counts.proved > 50);
+  CHECK(counts.refused <= counts.refused_by_edge + 3);
+}
+
 TEST_CASE("an arm with more than the lanes hold is checked exactly", "[search][line]") {
   model::ChainOptions options;
   options.links = 18;
