@@ -594,9 +594,8 @@ void add_tick(py::module_& module) {
       .def_property_readonly(
           "goal", [](const PyTick& t) { return goal_dict(t.get().goal(), t.dof); },
           "The current goal as a dict: type, tolerances, path, path_margin_m (its clearance away\n"
-          "from its ends, if it was searched), path_search (\"not sought\", \"sought\", "
-          "\"found\",\n"
-          "\"not found\"), and q or position_m, quaternion_wxyz, velocity_m_s,\n"
+          "from its ends, if it was searched), path_search (\"not sought\", \"sought\",\n"
+          "\"found\", \"not found\"), and q or position_m, quaternion_wxyz, velocity_m_s,\n"
           "angular_velocity_rad_s; a copy.")
       .def_property_readonly(
           "goal_number", [](const PyTick& t) { return t.get().goal_number(); },
@@ -761,9 +760,9 @@ void add_setup(py::module_& module) {
            "Draws a line of points of the world, shape (N, 3) [m], for log and report; in tick().")
       .def(
           "request_path", [](const PySetup& s) { return s.services().request_path(); },
-          "Asks for a collision-free path to the current goal; in tick(). Returns whether one "
-          "will\n"
-          "be searched. Later ticks have another goal: at first one where the arm waits, then one\n"
+          "Asks for a collision-free path to the current goal; in tick(). Returns whether one\n"
+          "will be searched. Later ticks have another goal: at first one where the arm waits, then "
+          "one\n"
           "with the path, or the goal itself if none was found; goal[\"path_search\"] says which.")
       .def("clearance", &setup_clearance, arg("q"), py::kw_only(), arg("time_ahead") = 0.0,
            arg("at_least") = -1.0e9,

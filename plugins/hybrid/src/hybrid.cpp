@@ -32,10 +32,9 @@ constexpr double longest_wait_s = 6.0;
 // Largest |error| of a joint at the end of a path to a target [rad or m].
 constexpr double path_end_reached = 0.1;
 // An arm that is kept from its target, farther than so far [m and ½ rad], for so long and up to
-// this share of the desired motion, asks for a way to it, and if there was none, again soon: the
-// target moves on. To a target that rests it asks a few times.
-constexpr double target_away = 0.06, target_blocked_s = 0.2, target_again_s = 0.2,
-                 target_blocked_share = 0.3;
+// this share of the desired motion, asks for a way to it, and if there was none, asks again after
+// the same time: the target moves on. To a target that rests it asks a few times.
+constexpr double target_away = 0.06, target_blocked_s = 0.2, target_blocked_share = 0.3;
 constexpr int target_searches = 3;
 // An arm so near to the reference of a trajectory tracks it [rad or m], unless its clock hardly
 // runs: then something holds the arm up, and the trajectory is a path.
@@ -354,7 +353,7 @@ class Hybrid final : public planning::Planner {
   void take_path_to_target(double now, double distance) {
     if (path_search() == HAMELIN_PATH_SOUGHT) return;
     awaits_path_ = false;
-    blocked_since_s_ = now - target_blocked_s + target_again_s;
+    blocked_since_s_ = now;
     if (path_search() != HAMELIN_PATH_FOUND || distance < target_away) return;
     take_path();
     enter(Mode::path_to_target, now);

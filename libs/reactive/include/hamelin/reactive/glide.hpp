@@ -7,8 +7,8 @@
 namespace hamelin::reactive {
 
 /// An arm without dynamics that is moved in long steps along obstacles and joint limits by a
-/// velocity under a safety filter: docs/theory.md (10.26), (10.27). Predictions are made of such steps. Only
-/// the constructor allocates.
+/// velocity under a safety filter: docs/theory.md (10.26), (10.27). Predictions are made of such
+/// steps. Only the constructor allocates.
 class Glide {
  public:
   static constexpr double step_s = 0.06;    ///< long steps are possible without dynamics
