@@ -12,13 +12,15 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/isa.hpp"
+#include "hamelin/core/rng.hpp"
 #include "ompl_search.hpp"
 
-// hamelin_search_peers [--seeds N] [--improve N] [--list] [--ours] SCENE...: searches a path to the
-// first goal of each scene by libs/search, and by OMPL's planners on the same proofs of motions.
-// Prints how many were found, CPU times until the first path and with shortening, checks and
-// lengths. OMPL is given the configuration at which our path ends, and so needs no inverse
-// kinematics.
+// hamelin_search_peers [--seeds N] [--improve N] [--changes N] [--list] [--peers A,B] SCENE...:
+// searches a path to the first goal of each scene by libs/search, and by OMPL's planners on the
+// same proofs of motions; `--peers none`: by ours only. Prints how many were found, CPU times until
+// the first path and with shortening, checks and lengths. OMPL is given the configuration at which
+// our path ends, and so needs no inverse kinematics. With --changes, boxes appear on the paths and
+// disappear, as often for each scene and seed; the table shows the searches of new paths.
 namespace {
 
 using namespace hamelin;
@@ -81,25 +83,48 @@ void print(const std::string& name, const Figures& f) {
       quantile(f.length, 0.5));
 }
 
-search::Path search_ours(Rig& rig, int seed, long improve, bool list, Figures& figures) {
+struct Options {
+  int seeds = 1, changes = 0;
+  long improve = 0;
+  bool list = false;
+  std::string peers;
+};
+
+search::Settings settings_of(const Rig& rig, int seed, const Options& options) {
   search::Settings settings = rig.settings;
   settings.seed = static_cast<std::uint64_t>(seed);
-  settings.improve_checks = improve;
-  search::Search search(rig.arm, settings);
+  settings.improve_checks = options.improve;
+  return settings;
+}
+
+// What slices of one check took [us].
+void print_slices(std::vector<double> us) {
+  fmt::print("slices of one check: {}, p50 {:.1f} us, p99 {:.1f}, p99.9 {:.1f}, largest {:.1f}\n",
+             us.size(), quantile(us, 0.5), quantile(us, 0.99), quantile(us, 0.999),
+             quantile(us, 1.0));
+}
+
+search::Path search_ours(Rig& rig, int seed, const Options& options, Figures& figures,
+                         std::vector<double>& slices_us) {
+  search::Search search(rig.arm, settings_of(rig, seed, options));
   rig.query.refresh(0.0);
   const long before = rig.query.checks();
   const double since = cpu_s();
   search.begin({rig.scene.start_q, {rig.scene.goals.front()}, 1}, rig.query);
   double first_s = 0.0;
   bool ended = false;
+  double at = since;
   while (!ended) {
     ended = search.advance(1);
-    if (first_s == 0.0 && search.path().planned.cols() > 0) first_s = cpu_s() - since;
+    const double now = cpu_s();
+    slices_us.push_back(1e6 * (now - at));
+    at = now;
+    if (first_s == 0.0 && search.path().planned.cols() > 0) first_s = now - since;
   }
-  const double all_s = cpu_s() - since;
+  const double all_s = at - since;
   const search::Path& path = search.path();
   figures.add(path.found(), first_s, all_s, rig.query.checks() - before, path.length);
-  if (list)
+  if (options.list)
     fmt::print(
         "  {} seed {}: {:.3f} and {:.3f} ms, {} checks, {} roots, margin {:.4f} m, {:.3f} {}\n",
         rig.scene.name, seed, 1e3 * first_s, 1e3 * all_s, path.checks, path.roots, path.margin_m,
@@ -128,40 +153,100 @@ void search_theirs(Rig& rig, const std::string& planner, int seed, const search:
               search::path_length(path));
 }
 
-int run(int argc, char** argv) {
-  int seeds = 1;
-  long improve = 0;
-  bool list = false, only_ours = false;
-  std::vector<std::unique_ptr<Rig>> rigs;
+/// What happens where the map changes on a path.
+struct Reaction {
+  std::vector<double> publish_ms;  ///< the change of the world, on whichever thread makes it
+  Figures searches;                ///< from the change on
+};
+
+// A box of 6 cm appears where the tip is at a random place of the path, and the search begins again
+// at its start; then the box disappears.
+void change_map(Rig& rig, const search::Path& path, int seed, const Options& options, Rng& rng,
+                Reaction& reaction) {
+  constexpr double half_m = 0.03;
+  dynamics::Workspace ws(rig.arm);
+  search::Search search(rig.arm, settings_of(rig, seed, options));
+  for (int i = 0; i < options.changes; ++i) {
+    const auto line =
+        static_cast<Eigen::Index>(rng.uniform(0.0, static_cast<double>(path.points.cols() - 1)));
+    const VectorXd from = path.points.col(line), to = path.points.col(line + 1);
+    dynamics::forward_kinematics(rig.arm, ws, from + rng.uniform(0.2, 0.8) * (to - from));
+    const Eigen::Vector3d tip = rig.scene.map->pose.inverse() * dynamics::tip_pose(rig.arm, ws).p();
+    const Eigen::Vector3d half = Eigen::Vector3d::Constant(half_m);
+    scene::MapChangeSpec appear, disappear;
+    appear.occupied_m = {{tip - half, tip + half}};
+    disappear.free_m = appear.occupied_m;
+    const double published = cpu_s();
+    rig.world.change_map(appear);
+    const double since = cpu_s();
+    reaction.publish_ms.push_back(1e3 * (since - published));
+    rig.query.refresh(0.0);
+    const search::Path next =
+        search.search({rig.scene.start_q, {rig.scene.goals.front()}, 2}, rig.query);
+    const double all_s = cpu_s() - since;
+    reaction.searches.add(next.found(), all_s, all_s, next.checks, next.length);
+    rig.world.change_map(disappear);
+  }
+}
+
+Options read(int argc, char** argv, std::vector<std::unique_ptr<Rig>>& rigs) {
+  Options out;
   for (int i = 1; i < argc; ++i) {
     const std::string arg = argv[i];
     if (arg == "--seeds" && i + 1 < argc)
-      seeds = std::atoi(argv[++i]);
+      out.seeds = std::atoi(argv[++i]);
     else if (arg == "--improve" && i + 1 < argc)
-      improve = std::atol(argv[++i]);
+      out.improve = std::atol(argv[++i]);
+    else if (arg == "--changes" && i + 1 < argc)
+      out.changes = std::atoi(argv[++i]);
+    else if (arg == "--peers" && i + 1 < argc)
+      out.peers = fmt::format(",{},", argv[++i]);
     else if (arg == "--list")
-      list = true;
-    else if (arg == "--ours")
-      only_ours = true;
+      out.list = true;
     else
       rigs.push_back(std::make_unique<Rig>(arg));
   }
+  return out;
+}
+
+int run(int argc, char** argv) {
+  std::vector<std::unique_ptr<Rig>> rigs;
+  const Options options = read(argc, argv, rigs);
   fmt::print("instruction set {}\n", name_of(default_isa()));
   fmt::print("{:<16} {:>9} {:>7} {:>7} {:>7} {:>8} | {:>7} {:>7} {:>8} {:>8} {:>7}\n", "search",
              "found", "p50 ms", "p75", "p95", "max", "all p50", "p95", "max", "checks", "length");
   Figures ours;
   std::vector<search::Path> paths;
+  std::vector<double> slices_us;
   for (auto& rig : rigs)
-    for (int seed = 1; seed <= seeds; ++seed)
-      paths.push_back(search_ours(*rig, seed, improve, list, ours));
+    for (int seed = 1; seed <= options.seeds; ++seed)
+      paths.push_back(search_ours(*rig, seed, options, ours, slices_us));
   print("hamelin", ours);
-  if (only_ours) return 0;
-  for (const std::string& planner : peers::ompl_planners()) {
-    Figures theirs;
+  print_slices(std::move(slices_us));
+  const auto for_paths = [&](const auto& call) {
     auto path = paths.begin();
     for (auto& rig : rigs)
-      for (int seed = 1; seed <= seeds; ++seed, ++path)
-        if (path->found()) search_theirs(*rig, planner, seed, *path, theirs);
+      for (int seed = 1; seed <= options.seeds; ++seed, ++path)
+        if (path->found()) call(*rig, seed, *path);
+  };
+  if (options.changes > 0) {
+    Reaction reaction;
+    Rng rng(1);
+    for_paths([&](Rig& rig, int seed, const search::Path& path) {
+      if (rig.scene.map) change_map(rig, path, seed, options, rng, reaction);
+    });
+    print("map changes", reaction.searches);
+    fmt::print("publishing a change: p50 {:.2f} ms, p95 {:.2f}, largest {:.2f}\n",
+               quantile(reaction.publish_ms, 0.5), quantile(reaction.publish_ms, 0.95),
+               quantile(reaction.publish_ms, 1.0));
+  }
+  for (const std::string& planner : peers::ompl_planners()) {
+    if (!options.peers.empty() && options.peers.find("," + planner + ",") == std::string::npos)
+      continue;
+    Figures theirs;
+    for_paths([&](Rig& rig, int seed, const search::Path& path) {
+      search_theirs(rig, planner, seed, path, theirs);
+    });
     print(planner, theirs);
   }
   return 0;

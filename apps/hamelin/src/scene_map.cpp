@@ -198,7 +198,7 @@ Json map_info(const std::filesystem::path& file, const MapInfoOptions& options) 
   const auto shares = scene::shares_within(map, ball);
   const auto build = std::chrono::steady_clock::now();
   const auto cells = scene::crop(map.occupied, map.resolution, ball);
-  const scene::MapField field(cells, map.resolution, ball);
+  const scene::MapField field(cells, map.resolution, ball.center);
   const double build_ms = ms_since(build);
   info["within_reach"] = {
       {"base_m", list(ball.center)},           {"reach_m", ball.radius},

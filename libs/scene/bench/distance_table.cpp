@@ -221,7 +221,7 @@ void print_changes(const MapField& made, const std::vector<Cell>& cells, double 
                    const Ball& region) {
   Rng rng(7);
   const auto timed = [&](const char* name, const auto& make) {
-    MapField field(cells, resolution, region);
+    MapField field(cells, resolution, region.center);
     double ms = 0.0;
     std::size_t voxels = 0;
     constexpr int rounds = 20;
@@ -297,7 +297,7 @@ struct Part {
     map = read_map(command.file, {command.scale, 0.5});
     const double read_ms = 1e3 * seconds_since(start);
     crop_ms = least_ms([&] { cells = crop(map.occupied, map.resolution, region); });
-    build_ms = least_ms([&] { field = MapField(cells, map.resolution, region); });
+    build_ms = least_ms([&] { field = MapField(cells, map.resolution, region.center); });
     if (field.empty())
       throw Error(ErrorCode::invalid,
                   fmt::format("{}: no occupied leaf in that ball", command.file));
@@ -350,14 +350,8 @@ void print_points(const Part& part, const Queries& queries) {
   const auto& points = queries.points;
   const double made_ms = part.crop_ms + part.build_ms;
   BoxHit hit;
-  (void)least_ns(points.size(), [&](std::size_t i) {
-    (void)field.nearest(points[i], infinity, hit);
-  });  // fills the table
   row("hamelin, cold", made_ms, points, queries.truth, [&](std::size_t i) {
     return field.nearest(points[i], infinity, hit) ? hit.distance : infinity;
-  });
-  row("hamelin, cold, without the table", made_ms, points, queries.truth, [&](std::size_t i) {
-    return field.boxes().nearest(points[i], infinity, hit) ? hit.distance : infinity;
   });
   std::vector<std::int32_t> hints;
   for (const Vector3d& p : points) hints.push_back(field.nearest(p, infinity, hit) ? hit.box : -1);

@@ -72,8 +72,8 @@ Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle
   static_cast<MapSummary&>(summary_) = region.summary;
   map_pose_ = map->pose;
   map_pose_inverse_ = map->pose.inverse();
-  map_ = std::make_shared<MapField>(region.occupied, region.resolution_m, region.reachable);
-  unknown_ = std::make_shared<MapField>(region.unknown, region.resolution_m, region.reachable);
+  map_ = std::make_shared<MapField>(region.occupied, region.resolution_m, region.reachable.center);
+  unknown_ = std::make_shared<MapField>(region.unknown, region.resolution_m, region.reachable.center);
   summary_.boxes = map_->boxes().boxes().size();
   summary_.unknown_boxes = unknown_->boxes().boxes().size();
   map_spec_ = map;
@@ -330,12 +330,16 @@ void Environment::add_obstacle_contacts(std::size_t k, const Shapes& arm, double
   }
 }
 
+bool Environment::is_map_beyond(const Eigen::Vector3d& p, double limit) const {
+  return field_->made && field_->field != nullptr &&
+         field_->field->is_farther(map_pose_inverse_ * p, limit);
+}
+
 double Environment::clearance(const Shapes& arm, const Moment& moment, double limit, View view,
                               std::span<const std::uint8_t> seen, Among among) const {
   double smallest = limit;
   BoxHit hit;
   SegmentHit axis_hit;
-  const DistanceField* const bounds = field_->made ? field_->field.get() : nullptr;
   const auto consider = [&](const MapField& field) {
     if (field.empty() || view == View::hidden || among == Among::moving) return;
     std::int32_t hint = -1;
@@ -344,8 +348,7 @@ double Environment::clearance(const Shapes& arm, const Moment& moment, double li
       // must not be below zero.
       const double near = std::max(0.0, smallest + arm.radii[i]);
       const double half = arm.is_capsule(i) ? arm.half_axes[i].norm() : 0.0;
-      if (bounds != nullptr && bounds->is_farther(map_pose_inverse_ * arm.centers[i], near + half))
-        continue;
+      if (is_map_beyond(arm.centers[i], near + half)) continue;
       if (half > 0.0) {
         if (!field.nearest(map_pose_inverse_ * arm.from(i), map_pose_inverse_ * arm.to(i), near,
                            axis_hit, hint))
@@ -371,7 +374,8 @@ Environment::Standing Environment::nearest_standing(const Eigen::Vector3d& a,
                                                     double time_s, std::int32_t& hint, View view,
                                                     std::span<const std::uint8_t> seen) const {
   Standing nearest{limit, Contact::map};
-  if (view != View::hidden) {
+  const double half = 0.5 * (b - a).norm();
+  if (view != View::hidden && !is_map_beyond(0.5 * (a + b), limit + half)) {
     const Eigen::Vector3d from = map_pose_inverse_ * a, to = map_pose_inverse_ * b;
     nearest.distance = map_->distance(from, to, limit, hint);
     if (summary_.unknown == UnknownPolicy::block) {
@@ -380,7 +384,6 @@ Environment::Standing Environment::nearest_standing(const Eigen::Vector3d& a,
       if (distance < nearest.distance) nearest = {distance, Contact::unknown};
     }
   }
-  const double half = 0.5 * (b - a).norm();
   for (std::size_t k = 0; k < obstacles_.size(); ++k) {
     const Obstacle& obstacle = obstacles_[k];
     if (!in_view(k, time_s, view, seen, Among::standing)) continue;

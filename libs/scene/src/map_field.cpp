@@ -11,7 +11,6 @@ namespace hamelin::scene {
 namespace {
 
 constexpr double cone_cosine = 0.86602540378443865;  // 30°
-constexpr double table_edge_m = 0.05;
 
 std::vector<Box> in_metres(const std::vector<VoxelBox>& voxels, double resolution) {
   std::vector<Box> boxes;
@@ -33,21 +32,18 @@ std::size_t volume(const std::vector<VoxelBox>& boxes) {
 
 }  // namespace
 
-MapField::MapField(const std::vector<Cell>& cells, double resolution, const Ball& reachable)
+MapField::MapField(const std::vector<Cell>& cells, double resolution,
+                   const Eigen::Vector3d& origin)
     : resolution_(resolution),
-      reachable_(reachable),
-      boxes_(in_metres(merge(cells), resolution), reachable.center),
-      surface_(std::make_unique<Surface>()) {
-  if (!boxes_.empty()) near_ = NearTable(reachable, table_edge_m);
-}
+      origin_(origin),
+      boxes_(in_metres(merge(cells), resolution), origin),
+      surface_(std::make_unique<Surface>()) {}
 
 MapField::MapField(const MapField& other)
     : resolution_(other.resolution_),
-      reachable_(other.reachable_),
+      origin_(other.origin_),
       boxes_(other.boxes_),
-      surface_(std::make_unique<Surface>()) {
-  if (!boxes_.empty()) near_ = NearTable(reachable_, table_edge_m);
-}
+      surface_(std::make_unique<Surface>()) {}
 
 std::vector<VoxelBox> MapField::voxel_boxes(std::size_t from) const {
   std::vector<VoxelBox> voxels;
@@ -109,15 +105,13 @@ MapField::Changed MapField::change(const std::vector<VoxelBox>& add,
   cut.erase(std::lower_bound(cut.begin(), cut.end(), static_cast<std::int32_t>(first_added)),
             cut.end());
   boxes_.change(cut, in_metres(added, resolution_));
-  if (near_.bytes() == 0) near_ = NearTable(reachable_, table_edge_m);
-  if (changed.added > 0) near_.clear();
   surface_ = std::make_unique<Surface>();
   return changed;
 }
 
 const BoxField& MapField::faces() const {
   std::call_once(surface_->made, [this] {
-    surface_->faces = BoxField(in_metres(surface(voxel_boxes(0)), resolution_), reachable_.center);
+    surface_->faces = BoxField(in_metres(surface(voxel_boxes(0)), resolution_), origin_);
   });
   return surface_->faces;
 }
@@ -217,12 +211,6 @@ void MapField::find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
 
 bool MapField::nearest(const Eigen::Vector3d& p, double limit, BoxHit& hit,
                        std::int32_t hint) const {
-  // with a hint and without a limit the table cannot help
-  if (hint < 0 || limit < infinity) {
-    const NearTable::Answer near = near_.query(boxes_, p);
-    if (static_cast<double>(near.lower) > limit) return false;
-    if (hint < 0) hint = near.hint;
-  }
   if (!boxes_.nearest(p, limit, hit, hint)) return false;
   if (hit.distance <= 0.0) find_exit(p, hit);
   return true;
@@ -230,11 +218,6 @@ bool MapField::nearest(const Eigen::Vector3d& p, double limit, BoxHit& hit,
 
 bool MapField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
                        SegmentHit& hit, std::int32_t hint) const {
-  if (hint < 0 || limit < infinity) {
-    const NearTable::Answer near = near_.query(boxes_, 0.5 * (a + b));
-    if (static_cast<double>(near.lower) > limit + 0.5 * (b - a).norm()) return false;
-    if (hint < 0) hint = near.hint;
-  }
   if (!boxes_.nearest(a, b, limit, hit, hint)) return false;
   if (hit.distance <= 0.0) find_deepest(a, b, hit);
   return true;
@@ -243,29 +226,15 @@ bool MapField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, doubl
 double MapField::distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
                           std::int32_t& hint) const {
   if (empty()) return limit;
-  const NearTable::Answer near = near_.query(boxes_, 0.5 * (a + b));
-  if (static_cast<double>(near.lower) > limit + 0.5 * (b - a).norm()) return limit;
   SegmentHit hit;
-  if (!boxes_.nearest(a, b, limit, hit, hint < 0 ? near.hint : hint)) return limit;
+  if (!boxes_.nearest(a, b, limit, hit, hint)) return limit;
   hint = hit.box;
   return std::max(0.0, hit.distance);
-}
-
-bool MapField::far(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
-                   BoxField::Vicinity* vicinity) const {
-  if (vicinity != nullptr && vicinity->covers(boxes_, a, b, limit))
-    return vicinity->node_count_ == 0;
-  const double lower =
-      static_cast<double>(near_.query(boxes_, 0.5 * (a + b)).lower) - 0.5 * (b - a).norm();
-  if (!(lower > limit)) return false;
-  if (vicinity != nullptr) vicinity->set_empty(boxes_, a, b, lower);
-  return true;
 }
 
 std::size_t MapField::nearest_distinct(const Eigen::Vector3d& p, double limit, Scratch& scratch,
                                        std::span<BoxHit, points_max> out,
                                        BoxField::Vicinity* vicinity) const {
-  if (far(p, p, limit, vicinity)) return 0;
   const std::size_t count =
       boxes_.nearest_distinct(p, limit, cone_cosine, scratch.boxes_, out, vicinity);
   if (count == 0 || out[0].distance > 0.0) return count;
@@ -277,7 +246,6 @@ std::size_t MapField::nearest_distinct(const Eigen::Vector3d& a, const Eigen::Ve
                                        double limit, Scratch& scratch,
                                        std::span<SegmentHit, points_max> out,
                                        BoxField::Vicinity* vicinity) const {
-  if (far(a, b, limit, vicinity)) return 0;
   const std::size_t count =
       boxes_.nearest_distinct(a, b, limit, cone_cosine, scratch.boxes_, out, vicinity);
   if (count == 0 || out[0].distance > 0.0) return count;

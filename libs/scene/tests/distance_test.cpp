@@ -372,48 +372,6 @@ TEST_CASE("nearest and nearest_distinct of a segment are those of all boxes", "[
   }
 }
 
-TEST_CASE(
-    "a near table's bounds are below the distance, no looser than its cells, and independent of "
-    "the order of queries",
-    "[scene][property]") {
-  Rng rng(11);
-  const std::vector<Box> boxes = random_boxes(rng, 100);
-  const BoxField field(boxes);
-  const Ball region{{0.3, -0.2, 0.1}, 1.0};
-  const NearTable table(region, 0.05), again(region, 0.05);
-  std::vector<Vector3d> points;
-  for (int i = 0; i < 3000; ++i)
-    points.push_back(region.center + 1.2 * rng.uniform() * test::random_direction(rng));
-  std::vector<NearTable::Answer> answers;
-  int known = 0;
-  for (const Vector3d& p : points) {
-    const NearTable::Answer answer = table.query(field, p);
-    answers.push_back(answer);
-    if (answer.hint < 0) {
-      CHECK((p - region.center).norm() >= 1.0);
-      CHECK(answer.lower == -std::numeric_limits<float>::infinity());
-      continue;
-    }
-    ++known;
-    BoxHit hit;
-    REQUIRE(field.nearest(p, 10.0, hit));
-    CHECK(static_cast<double>(answer.lower) <= hit.distance);
-    if (answer.lower == -std::numeric_limits<float>::infinity())  // the cell's centre is in a box
-      CHECK(hit.distance <= 0.025 * std::sqrt(3.0) + 1.02e-4);
-    else
-      CHECK(static_cast<double>(answer.lower) >= hit.distance - 0.05 * std::sqrt(3.0) - 1.02e-4);
-    CHECK(static_cast<std::size_t>(answer.hint) < boxes.size());
-  }
-  CHECK(known > 1000);
-  for (std::size_t i = points.size(); i-- > 0;) {
-    const NearTable::Answer answer = again.query(field, points[i]);
-    CHECK(answer.lower == answers[i].lower);
-    CHECK(answer.hint == answers[i].hint);
-  }
-  CHECK(NearTable().query(field, region.center).hint == -1);
-  CHECK(table.query(BoxField(), region.center).hint == -1);
-}
-
 TEST_CASE("all instruction sets give the same bits", "[scene][unit]") {
   const Isa before = default_isa();
   Rng rng(12);

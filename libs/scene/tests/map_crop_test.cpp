@@ -69,8 +69,8 @@ TEST_CASE("inside the region a cropped map equals the map, to OctoMap and in dis
   const MapData before = read_map(options.map), after = read_map(options.output);
   CHECK(after.occupied.size() == report.occupied_leaves);
   CHECK(before.occupied.size() == report.occupied_leaves_before);
-  const MapField far_field(before.occupied, before.resolution, {{0.0, 0.0, 0.4}, 1.0}),
-      near_field(after.occupied, after.resolution, {{0.0, 0.0, 0.4}, 1.0});
+  const MapField far_field(before.occupied, before.resolution, {0.0, 0.0, 0.4}),
+      near_field(after.occupied, after.resolution, {0.0, 0.0, 0.4});
   Rng rng(17);
   std::map<char, int> kinds;
   int near = 0;

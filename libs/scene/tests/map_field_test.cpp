@@ -117,7 +117,7 @@ TEST_CASE(
   CAPTURE(seed);
   Rng rng(seed);
   const Grid grid = random_grid(rng);
-  const MapField field(grid.occupied(), voxel_m, reachable);
+  const MapField field(grid.occupied(), voxel_m, reachable.center);
   MapField::Scratch scratch(field);
   int inside = 0;
   for (int i = 0; i < 60; ++i) {
@@ -137,7 +137,7 @@ TEST_CASE(
 TEST_CASE("on the surface the direction is the normal that leads out", "[scene][unit]") {
   // two boxes that cannot be one: an L
   const std::vector<Cell> cells{{{0, 0, 0}, 2}, {{2, 0, 0}, 1}};
-  const MapField field(cells, 1.0, {{0.0, 0.0, 0.0}, 5.0});
+  const MapField field(cells, 1.0, {0.0, 0.0, 0.0});
   BoxHit hit;
   const auto direction = [&](const Vector3d& p) {
     REQUIRE(field.nearest(p, 0.0, hit));
@@ -159,7 +159,7 @@ TEST_CASE("a capsule's axis is as deep as its deepest point, and as near as its 
   CAPTURE(seed);
   Rng rng(seed);
   const Grid grid = random_grid(rng);
-  const MapField field(grid.occupied(), voxel_m, reachable);
+  const MapField field(grid.occupied(), voxel_m, reachable.center);
   MapField::Scratch scratch(field);
   int inside = 0;
   for (int i = 0; i < 25; ++i) {
@@ -190,7 +190,7 @@ TEST_CASE("a map that changed gives the distances of a map built in that state",
   CAPTURE(seed);
   Rng rng(seed);
   Grid grid = seed == 0 ? Grid() : random_grid(rng);
-  MapField field(grid.occupied(), voxel_m, reachable);
+  MapField field(grid.occupied(), voxel_m, reachable.center);
   for (int round = 0; round < 12; ++round) {
     CAPTURE(round);
     // queried before the change, so that the table contains the old state
@@ -210,7 +210,7 @@ TEST_CASE("a map that changed gives the distances of a map built in that state",
     for (const Cell& cell : remove) without.set(cell.lo, false);
     CHECK(changed.removed == before.count() - without.count());
     CHECK(changed.added == grid.count() - without.count());
-    const MapField rebuilt(grid.occupied(), voxel_m, reachable);
+    const MapField rebuilt(grid.occupied(), voxel_m, reachable.center);
     MapField::Scratch scratch(field), scratch_rebuilt(rebuilt);
     for (int i = 0; i < 15; ++i) {
       const Vector3d p = random_point(rng, grid), q = random_point(rng);
@@ -230,7 +230,7 @@ TEST_CASE("a map that changed gives the distances of a map built in that state",
 
 TEST_CASE("a field whose boxes are all removed is empty, and many additions rebuild the tree",
           "[scene][unit]") {
-  MapField field({{{0, 0, 0}, 8}}, 0.1, {{0.0, 0.0, 0.0}, 2.0});
+  MapField field({{{0, 0, 0}, 8}}, 0.1, {0.0, 0.0, 0.0});
   BoxHit hit;
   CHECK(field.change({}, {{{0, 0, 0}, {8, 8, 8}}}).removed == 512);
   CHECK_FALSE(field.nearest({0.4, 0.4, 0.4}, infinity, hit));

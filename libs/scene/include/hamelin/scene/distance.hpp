@@ -169,40 +169,4 @@ class BoxField {
   std::vector<std::int32_t> slot_of_;  ///< 8 node + slot of each box
 };
 
-/// Distance and nearest box of a field at the centre of each cell of a coarse grid over a ball,
-/// computed at the first query in the cell. By docs/theory.md (11.6), (11.24) one look-up can prove
-/// that nothing is near, and it yields a hint for the search. Const queries may run on several
-/// threads: all of them would write the same values.
-class NearTable {
- public:
-  NearTable() = default;
-  /// @param region where queries will be; elsewhere it has no bounds
-  /// @param edge of a cell [m]; increased if there would be more than 10⁶ cells
-  NearTable(const Ball& region, double edge);
-
-  struct Answer {
-    float lower = 0.0F;  ///< no box is nearer [m]
-    std::int32_t hint = -1;
-  };
-  /// @param field the same at each call; boxes may have been removed from it in between
-  [[nodiscard]] Answer query(const BoxField& field, const Eigen::Vector3d& p) const;
-
-  /// Clears all cells; to be called when boxes were added to the field.
-  void clear();
-
-  [[nodiscard]] std::size_t bytes() const noexcept {
-    return cells_.capacity() * sizeof(std::uint32_t);
-  }
-
- private:
-  Eigen::Vector3d low_ = Eigen::Vector3d::Zero();
-  double edge_ = 0.0, inverse_edge_ = 0.0;
-  std::size_t count_ = 0;  ///< along each axis
-  /// Lower 16 bits: the distance at the cell's centre, rounded down to a number of units, plus one;
-  /// zero units, also inside a box, give no bound.
-  /// Upper 16 bits: the index of the nearest box plus one, or zero if that is too large. Zero if
-  /// the cell was not queried yet.
-  mutable std::vector<std::uint32_t> cells_;
-};
-
 }  // namespace hamelin::scene

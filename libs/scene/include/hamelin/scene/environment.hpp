@@ -211,6 +211,11 @@ class Environment {
   void add_map_contacts(const MapField& field, int id, const Shapes& arm, double influence,
                         MapField::Scratch& scratch, std::vector<BoxField::Vicinity>* vicinity,
                         std::vector<Contact>& found) const;
+  /// Whether the distance field, if it is made, proves that the map and unknown space that blocks
+  /// are farther from a point of the world than the limit, docs/theory.md (11.24). For a shape with
+  /// an axis, the point is its centre and the limit grows by half of the axis, docs/theory.md
+  /// (11.6).
+  [[nodiscard]] bool is_map_beyond(const Eigen::Vector3d& p, double limit) const;
   void add_obstacle_contacts(std::size_t k, const Shapes& arm, double influence, const Placed& at,
                              std::vector<Contact>& found) const;
   [[nodiscard]] static double clearance_to(const Obstacle& obstacle, const Shapes& arm,

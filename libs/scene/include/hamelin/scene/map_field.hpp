@@ -13,7 +13,7 @@
 namespace hamelin::scene {
 
 /// Signed distances to the union of one kind of a map's cells (occupied or unknown), in the map's
-/// frame [m]: merged boxes in a tree, and a table that proves by one look-up where nothing is near.
+/// frame [m], by merged boxes in a tree.
 /// Inside the union, distances are minus the exact depth below its surface, docs/theory.md (11.5),
 /// and the direction is the exit direction. Cells can be added and removed by change(). All other
 /// calls are const and may run on several threads, each with a Scratch of its own.
@@ -26,10 +26,10 @@ class MapField {
   MapField() = default;
   /// @param cells disjoint, in voxels
   /// @param resolution edge of a voxel [m]
-  /// @param reachable where most queries will be
-  MapField(const std::vector<Cell>& cells, double resolution, const Ball& reachable);
-  /// A copy can be changed while queries run on the original. It computes table and surface
-  /// when they are first needed.
+  /// @param origin a point near the expected queries
+  MapField(const std::vector<Cell>& cells, double resolution, const Eigen::Vector3d& origin);
+  /// A copy can be changed while queries run on the original. It computes its surface when that is
+  /// first needed.
   MapField(const MapField& other);
   MapField(MapField&&) noexcept = default;
   MapField& operator=(const MapField&) = delete;
@@ -94,7 +94,7 @@ class MapField {
   }
 
   /// Memory in use.
-  [[nodiscard]] std::size_t bytes() const noexcept { return boxes_.bytes() + near_.bytes(); }
+  [[nodiscard]] std::size_t bytes() const noexcept { return boxes_.bytes(); }
 
  private:
   /// The union's surface, computed at the first query inside.
@@ -103,18 +103,14 @@ class MapField {
     BoxField faces;
   };
   [[nodiscard]] const BoxField& faces() const;
-  /// Whether table or vicinity prove that nothing is within the limit of the segment.
-  [[nodiscard]] bool far(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
-                         BoxField::Vicinity* vicinity) const;
   /// Distance and exit direction of a point in the union or on its surface.
   void find_exit(const Eigen::Vector3d& p, BoxHit& hit) const;
   void find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, SegmentHit& hit) const;
   [[nodiscard]] std::vector<VoxelBox> voxel_boxes(std::size_t from) const;
 
   double resolution_ = 0.0;
-  Ball reachable_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   BoxField boxes_;
-  NearTable near_;
   std::unique_ptr<Surface> surface_;
 };
 
