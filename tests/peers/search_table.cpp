@@ -159,8 +159,8 @@ struct Reaction {
   Figures searches;                ///< from the change on
 };
 
-// A box of 6 cm appears where the tip is at a random place of the path, and the search begins again
-// at its start; then the box disappears.
+// A box of 6 cm appears where the tip is at a random place of the path, unless start or goal would
+// touch it, and the search begins again at its start; then the box disappears.
 void change_map(Rig& rig, const search::Path& path, int seed, const Options& options, Rng& rng,
                 Reaction& reaction) {
   constexpr double half_m = 0.03;
@@ -181,6 +181,13 @@ void change_map(Rig& rig, const search::Path& path, int seed, const Options& opt
     const double since = cpu_s();
     reaction.publish_ms.push_back(1e3 * (since - published));
     rig.query.refresh(0.0);
+    const VectorXd goal = path.points.rightCols(1);
+    const bool blocked = std::min(rig.query.clearance(rig.scene.start_q, 0.0),
+                                  rig.query.clearance(goal, 0.0)) <= 0.0;
+    if (blocked) {
+      rig.world.change_map(disappear);
+      continue;
+    }
     const search::Path next =
         search.search({rig.scene.start_q, {rig.scene.goals.front()}, 2}, rig.query);
     const double all_s = cpu_s() - since;

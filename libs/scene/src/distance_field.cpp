@@ -115,31 +115,38 @@ void write_gap(std::int16_t* row, std::int32_t from, std::int32_t to, bool left,
     row[x] = square[static_cast<std::size_t>(cap + to - x)];
 }
 
-/// Squared distances of the nodes of a box from the voxels whose corners are in it, by one pass
-/// along each axis: docs/theory.md (17.6).
+/// Squared distances of the nodes of one box from the voxels whose corners are in another one
+/// around it, by one pass along each axis: docs/theory.md (17.6).
 class Transform {
  public:
-  Transform(const VoxelGrid& grid, const VoxelBox& nodes)
+  /// @param to at least 16 nodes along x
+  Transform(const VoxelGrid& grid, const VoxelBox& from, const VoxelBox& to)
       : grid_(grid),
-        nodes_(nodes),
-        nx_(nodes.hi[0] - nodes.lo[0]),
-        ny_(nodes.hi[1] - nodes.lo[1]),
-        nz_(nodes.hi[2] - nodes.lo[2]),
+        from_(from),
+        to_(to),
+        nx_(extent(to, 0)),
+        row_(static_cast<std::size_t>(extent(from, 0))),
         kernels_(kernel::select_transform_kernels(default_isa())) {}
 
-  void run(std::int16_t* out) {
-    const std::ptrdiff_t row = nx_, plane = row * ny_;
-    strip_.resize(static_cast<std::size_t>(row * std::max(ny_, nz_)));
-    for (std::int32_t z = 0; z < nz_; ++z) {
-      for (std::int32_t y = 0; y < ny_; ++y)
-        along_row(y, z, &strip_[static_cast<std::size_t>(y * row)]);
-      kernels_.add_axis(strip_.data(), out + z * plane, ny_, row, row, nx_, cap);
+  /// The squares of the nodes of `to`, x first; behind them there is other memory that was used.
+  std::vector<std::int16_t> run() {
+    const std::int32_t ny = extent(from_, 1), nz = extent(from_, 2), ny_to = extent(to_, 1);
+    const std::ptrdiff_t row = nx_, plane = row * ny_to;
+    std::vector<std::int16_t> out(static_cast<std::size_t>(plane * nz));
+    std::vector<std::int16_t> strip(static_cast<std::size_t>(row * std::max(ny, nz)));
+    for (std::int32_t z = 0; z < nz; ++z) {
+      for (std::int32_t y = 0; y < ny; ++y)
+        along_row(y, z, &strip[static_cast<std::size_t>(y * row)]);
+      kernels_.add_axis(strip.data(), out.data() + z * plane, ny, first(1), ny_to, row, row, nx_,
+                        cap);
     }
-    for (std::int32_t y = 0; y < ny_; ++y) {
-      for (std::int32_t z = 0; z < nz_; ++z)
-        std::copy_n(out + z * plane + y * row, nx_, &strip_[static_cast<std::size_t>(z * row)]);
-      kernels_.add_axis(strip_.data(), out + y * row, nz_, row, plane, nx_, cap);
+    for (std::int32_t y = 0; y < ny_to; ++y) {
+      std::int16_t* const column = out.data() + y * row;
+      for (std::int32_t z = 0; z < nz; ++z)
+        std::copy_n(column + z * plane, nx_, &strip[static_cast<std::size_t>(z * row)]);
+      kernels_.add_axis(strip.data(), column, nz, first(2), extent(to_, 2), row, plane, nx_, cap);
     }
+    return out;
   }
 
  private:
@@ -153,27 +160,35 @@ class Transform {
     return here | (here << 1U) | (voxels(word - 1) >> 63U);
   }
 
-  void along_row(std::int32_t y, std::int32_t z, std::int16_t* row) const {
-    std::fill_n(row, nx_, static_cast<std::int16_t>(cap * cap));
-    const std::int32_t shift = nodes_.lo[0] - grid_.box().lo[0];  // of the row against the grid
-    std::int32_t last = -1;                                       // set node
-    for (std::int32_t word = shift >> 6; word <= (shift + nx_ - 1) >> 6; ++word)
-      for (std::uint64_t bits = set_nodes(word, nodes_.lo[1] + y, nodes_.lo[2] + z); bits != 0;
+  void along_row(std::int32_t y, std::int32_t z, std::int16_t* out) {
+    const auto count = static_cast<std::int32_t>(row_.size());
+    std::int16_t* const row = row_.data();
+    std::fill_n(row, count, static_cast<std::int16_t>(cap * cap));
+    const std::int32_t shift = from_.lo[0] - grid_.box().lo[0];  // of the row against the grid
+    std::int32_t last = -1;                                      // set node
+    for (std::int32_t word = shift >> 6; word <= (shift + count - 1) >> 6; ++word)
+      for (std::uint64_t bits = set_nodes(word, from_.lo[1] + y, from_.lo[2] + z); bits != 0;
            bits &= bits - 1U) {
         const std::int32_t x = 64 * word + std::countr_zero(bits) - shift;
-        if (x < 0 || x >= nx_) continue;
+        if (x < 0 || x >= count) continue;
         write_gap(row, last + 1, x, last >= 0, true);
         row[x] = 0;
         last = x;
       }
-    if (last >= 0) write_gap(row, last + 1, nx_, true, false);
+    if (last >= 0) write_gap(row, last + 1, count, true, false);
+    std::copy_n(row + first(0), nx_, out);
   }
 
+  static std::int32_t extent(const VoxelBox& box, std::size_t axis) {
+    return box.hi[axis] - box.lo[axis];
+  }
+  [[nodiscard]] std::int32_t first(std::size_t axis) const { return to_.lo[axis] - from_.lo[axis]; }
+
   const VoxelGrid& grid_;
-  VoxelBox nodes_;
-  std::int32_t nx_, ny_, nz_;
+  VoxelBox from_, to_;
+  std::int32_t nx_;
+  std::vector<std::int16_t> row_;
   const kernel::TransformKernels& kernels_;
-  std::vector<std::int16_t> strip_;
 };
 
 }  // namespace
@@ -310,8 +325,7 @@ void DistanceField::compute_all() {
   values_.clear();
   if (is_empty(used_)) return;
   nodes_ = nodes_around(used_);
-  std::vector<std::int16_t> squares(static_cast<std::size_t>(volume(nodes_)));
-  Transform(grid_, nodes_).run(squares.data());
+  const std::vector<std::int16_t> squares = Transform(grid_, nodes_, nodes_).run();
   const auto& value = tables().value;
   values_.resize(squares.size() + padding);
   for (std::size_t i = 0; i < squares.size(); ++i)
@@ -321,17 +335,14 @@ void DistanceField::compute_all() {
 void DistanceField::compute_near(const VoxelBox& changed) {
   const VoxelBox to = common(corners(widened(changed, cap)), nodes_);
   const VoxelBox from = common(corners(widened(changed, 2 * cap)), nodes_);
-  std::vector<std::int16_t> squares(static_cast<std::size_t>(volume(from)));
-  Transform(grid_, from).run(squares.data());
+  const std::vector<std::int16_t> squares = Transform(grid_, from, to).run();
   const auto& value = tables().value;
-  const std::ptrdiff_t nx = from.hi[0] - from.lo[0], ny = from.hi[1] - from.lo[1];
+  const std::int16_t* square = squares.data();
   for (std::int32_t z = to.lo[2]; z < to.hi[2]; ++z)
     for (std::int32_t y = to.lo[1]; y < to.hi[1]; ++y) {
-      const std::int16_t* const row =
-          &squares[static_cast<std::size_t>(((z - from.lo[2]) * ny + y - from.lo[1]) * nx)];
       std::uint16_t* const out = &values_[index(to.lo[0], y, z)];
-      for (std::int32_t x = to.lo[0]; x < to.hi[0]; ++x)
-        out[x - to.lo[0]] = value[static_cast<std::size_t>(row[x - from.lo[0]])];
+      for (std::int32_t x = 0; x < to.hi[0] - to.lo[0]; ++x)
+        out[x] = value[static_cast<std::size_t>(*square++)];
     }
 }
 

@@ -54,13 +54,13 @@ HAMELIN_INLINE Lanes lowest(const std::int16_t* in, int row, int rows, std::ptrd
   return least;
 }
 
-void add_axis(const std::int16_t* in, std::int16_t* out, int rows, std::ptrdiff_t in_stride,
-              std::ptrdiff_t out_stride, int width, int cap) noexcept {
-  for (int row = 0; row < rows; ++row)
+void add_axis(const std::int16_t* in, std::int16_t* out, int rows, int first, int count,
+              std::ptrdiff_t in_stride, std::ptrdiff_t out_stride, int width, int cap) noexcept {
+  for (int row = first; row < first + count; ++row)
     for (int at = 0; at < width; at += lanes) {
       const int x = at + lanes <= width ? at : width - lanes;  // the last ones again
       const Lanes least = lowest(in + row * in_stride + x, row, rows, in_stride, cap);
-      __builtin_memcpy(out + row * out_stride + x, &least, sizeof least);
+      __builtin_memcpy(out + (row - first) * out_stride + x, &least, sizeof least);
     }
 }
 
