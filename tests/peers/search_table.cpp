@@ -160,7 +160,7 @@ struct Reaction {
 };
 
 // A box of 6 cm appears where the tip is at a random place of the path, unless start or goal would
-// touch it, and the search begins again at its start; then the box disappears.
+// touch it, and the search begins again at its start; then the map is as it was.
 void change_map(Rig& rig, const search::Path& path, int seed, const Options& options, Rng& rng,
                 Reaction& reaction) {
   constexpr double half_m = 0.03;
@@ -173,26 +173,23 @@ void change_map(Rig& rig, const search::Path& path, int seed, const Options& opt
     dynamics::forward_kinematics(rig.arm, ws, from + rng.uniform(0.2, 0.8) * (to - from));
     const Eigen::Vector3d tip = rig.scene.map->pose.inverse() * dynamics::tip_pose(rig.arm, ws).p();
     const Eigen::Vector3d half = Eigen::Vector3d::Constant(half_m);
-    scene::MapChangeSpec appear, disappear;
+    scene::MapChangeSpec appear;
     appear.occupied_m = {{tip - half, tip + half}};
-    disappear.free_m = appear.occupied_m;
     const double published = cpu_s();
     rig.world.change_map(appear);
     const double since = cpu_s();
     reaction.publish_ms.push_back(1e3 * (since - published));
     rig.query.refresh(0.0);
     const VectorXd goal = path.points.rightCols(1);
-    const bool blocked = std::min(rig.query.clearance(rig.scene.start_q, 0.0),
-                                  rig.query.clearance(goal, 0.0)) <= 0.0;
-    if (blocked) {
-      rig.world.change_map(disappear);
-      continue;
+    if (std::min(rig.query.clearance(rig.scene.start_q, 0.0), rig.query.clearance(goal, 0.0)) >
+        0.0) {
+      const search::Path next =
+          search.search({rig.scene.start_q, {rig.scene.goals.front()}, 2}, rig.query);
+      const double all_s = cpu_s() - since;
+      reaction.searches.add(next.found(), all_s, all_s, next.checks, next.length);
     }
-    const search::Path next =
-        search.search({rig.scene.start_q, {rig.scene.goals.front()}, 2}, rig.query);
-    const double all_s = cpu_s() - since;
-    reaction.searches.add(next.found(), all_s, all_s, next.checks, next.length);
-    rig.world.change_map(disappear);
+    rig.world.set_map(rig.scene.map);  // not the box alone: it may have covered voxels of the map
+    rig.query.refresh(0.0);            // makes the field that the next change is to follow
   }
 }
 

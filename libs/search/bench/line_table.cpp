@@ -99,6 +99,9 @@ class Rig {
     return above;
   }
 
+  [[nodiscard]] const model::Model& arm() const { return arm_; }
+  [[nodiscard]] const scene::Environment& environment() const { return environment_; }
+
  private:
   bool samples_clear(const VectorXd& a, const VectorXd& b, double margin) {
     const auto count = static_cast<int>(std::ceil((b - a).norm() / sample_rad)) + 1;
@@ -194,20 +197,16 @@ int run(int argc, char** argv) {
              "changes", "p50/p95 ms", "different");
   for (const std::string& file : files) {
     const scene::Scene scene = scene::read_scene(file);
-    const model::Model arm(
-        description::read_robot(scene.robot.file,
-                                {scene.robot.tip, scene.robot.spheres, scene.robot.srdf}),
-        scene.base);
     Rng rng(1);
     Rig rig(scene);
     const Rig::Counts counts = rig.compare(lines, rng);
     const long above = rig.bounds_above(lines, rng);
-    const scene::Environment environment = environment_of(scene, arm);
+    const scene::Environment& environment = rig.environment();
     Changes changed;
     if (scene.map) changed.run(environment, environment.summary().resolution_m, changes, rng);
     const auto field = environment.distance_field();
     fmt::print(row, std::filesystem::path(file).stem().string(),
-               fmt::format("{:.1f}", build_ms(scene, arm)),
+               fmt::format("{:.1f}", build_ms(scene, rig.arm())),
                fmt::format("{:.1f}", field ? 1e-6 * static_cast<double>(field->bytes()) : 0.0),
                lines, counts.proved, counts.wrong, fmt::format("{:.1f}", counts.check_us), above,
                changed.ms.size(),
