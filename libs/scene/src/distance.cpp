@@ -444,18 +444,12 @@ bool BoxField::Vicinity::covers(const BoxField& field, const Eigen::Vector3d& a,
          (b - b_).squaredNorm() <= rest * rest;
 }
 
-void BoxField::Vicinity::set_empty(const BoxField& field, const Eigen::Vector3d& a,
-                                   const Eigen::Vector3d& b, double reach) noexcept {
+void BoxField::Vicinity::gather(const BoxField& field, const Eigen::Vector3d& a,
+                                const Eigen::Vector3d& b, double reach) noexcept {
   revision_ = field.revision_;
   a_ = a;
   b_ = b;
   reach_ = reach;
-  node_count_ = 0;
-}
-
-void BoxField::Vicinity::gather(const BoxField& field, const Eigen::Vector3d& a,
-                                const Eigen::Vector3d& b, double reach) noexcept {
-  set_empty(field, a, b, reach);
   node_count_ = field.kernels_->gather(field.tree(), a.data(), a == b ? nullptr : b.data(), reach_,
                                        nodes_.get(), static_cast<int>(nodes_max));
 }

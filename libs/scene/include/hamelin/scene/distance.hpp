@@ -96,12 +96,9 @@ class BoxField {
 
    private:
     friend class BoxField;
-    friend class MapField;
     static constexpr std::size_t nodes_max = 64;
     [[nodiscard]] bool covers(const BoxField& field, const Eigen::Vector3d& a,
                               const Eigen::Vector3d& b, double limit) const noexcept;
-    void set_empty(const BoxField& field, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                   double reach) noexcept;
     void gather(const BoxField& field, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                 double reach) noexcept;
 
