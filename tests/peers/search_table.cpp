@@ -99,36 +99,61 @@ search::Settings settings_of(const Rig& rig, int seed, const Options& options) {
 
 // What slices of one check took [us].
 void print_slices(std::vector<double> us) {
-  fmt::print("slices of one check: {}, p50 {:.1f} us, p99 {:.1f}, p99.9 {:.1f}, largest {:.1f}\n",
-             us.size(), quantile(us, 0.5), quantile(us, 0.99), quantile(us, 0.999),
-             quantile(us, 1.0));
+  const auto slow = std::count_if(us.begin(), us.end(), [](double x) { return x > 50.0; });
+  fmt::print(
+      "slices of one check: {}, p50 {:.1f} us, p99 {:.1f}, p99.9 {:.1f}, largest {:.1f}, above 50 "
+      "us: {}\n",
+      us.size(), quantile(us, 0.5), quantile(us, 0.99), quantile(us, 0.999), quantile(us, 1.0),
+      slow);
 }
 
-search::Path search_ours(Rig& rig, int seed, const Options& options, Figures& figures,
-                         std::vector<double>& slices_us) {
+/// A search in slices of one check.
+struct Timed {
+  search::Path path;
+  double first_s = 0.0, all_s = 0.0;
+  long checks = 0;
+  std::vector<double> slices_us;
+};
+
+Timed search_timed(Rig& rig, int seed, const Options& options) {
+  Timed out;
   search::Search search(rig.arm, settings_of(rig, seed, options));
   rig.query.refresh(0.0);
   const long before = rig.query.checks();
   const double since = cpu_s();
   search.begin({rig.scene.start_q, {rig.scene.goals.front()}, 1}, rig.query);
-  double first_s = 0.0;
-  bool ended = false;
   double at = since;
-  while (!ended) {
+  for (bool ended = false; !ended;) {
     ended = search.advance(1);
     const double now = cpu_s();
-    slices_us.push_back(1e6 * (now - at));
+    out.slices_us.push_back(1e6 * (now - at));
     at = now;
-    if (first_s == 0.0 && search.path().planned.cols() > 0) first_s = now - since;
+    if (out.first_s == 0.0 && search.path().planned.cols() > 0) out.first_s = now - since;
   }
-  const double all_s = at - since;
-  const search::Path& path = search.path();
-  figures.add(path.found(), first_s, all_s, rig.query.checks() - before, path.length);
+  out.all_s = at - since;
+  out.checks = rig.query.checks() - before;
+  out.path = search.path();
+  return out;
+}
+
+// The same search three times: the shortest time of each slice counts, since the others contain
+// what else the machine did. The times of the whole search are those of the first.
+search::Path search_ours(Rig& rig, int seed, const Options& options, Figures& figures,
+                         std::vector<double>& slices_us) {
+  Timed first = search_timed(rig, seed, options);
+  const search::Path& path = first.path;
+  figures.add(path.found(), first.first_s, first.all_s, first.checks, path.length);
+  for (int repeat = 1; repeat < 3; ++repeat) {
+    const Timed again = search_timed(rig, seed, options);
+    for (std::size_t i = 0; i < again.slices_us.size(); ++i)
+      first.slices_us.at(i) = std::min(first.slices_us.at(i), again.slices_us[i]);
+  }
+  slices_us.insert(slices_us.end(), first.slices_us.begin(), first.slices_us.end());
   if (options.list)
     fmt::print(
         "  {} seed {}: {:.3f} and {:.3f} ms, {} checks, {} roots, margin {:.4f} m, {:.3f} {}\n",
-        rig.scene.name, seed, 1e3 * first_s, 1e3 * all_s, path.checks, path.roots, path.margin_m,
-        path.length, path.cause);
+        rig.scene.name, seed, 1e3 * first.first_s, 1e3 * first.all_s, path.checks, path.roots,
+        path.margin_m, path.length, path.cause);
   return path;
 }
 

@@ -29,14 +29,14 @@ EdgeCheck::EdgeCheck(const model::Model& model, const scene::SelfField* self)
       ws_(model),
       first_(model),
       last_(model),
-      levels_(at(depth_max), Level{scene::PlacedShapes(model), {}}) {
+      levels_(at(depth_max), Level{scene::PlacedShapes(model), {}, {}}) {
   all_.resize(hints_.size() + (self != nullptr ? self->pairs().size() : 0));
   std::iota(all_.begin(), all_.end(), 0);
   // Pairs first: they are few, and their distances need no map.
   std::rotate(all_.begin(), all_.begin() + shape_count(), all_.end());
   for (Level& level : levels_) level.open.reserve(all_.size());
   const Index n = model.dof();
-  for (auto* x : {&start_, &dq_, &q_, &curvature_}) x->setZero(n);
+  for (auto* x : {&start_, &end_, &dq_, &q_, &curvature_}) x->setZero(n);
   bend_ = way_ = VectorXd::Zero(shape_count());
   pair_way_ = VectorXd::Zero(levers_.pairs().rows());
 }
@@ -88,9 +88,13 @@ bool EdgeCheck::keeps_margin(int subject, const scene::Shapes& arm, double margi
                                  scene::View::judge, {}, scene::Among::moving) >= margin_m;
 }
 
-bool EdgeCheck::motion_clear(const VectorXd& a, const VectorXd& b, double margin_m,
+void EdgeCheck::begin_motion(const VectorXd& a, const VectorXd& b, double margin_m,
                              std::span<const int> subjects) {
+  subjects_ = subjects;
+  open_levels_ = 0;
+  begins_ = true;
   start_ = a;
+  end_ = b;
   dq_ = b - a;
   margin_ = margin_m + edge_rounding_m;
   q_.setZero();
@@ -101,10 +105,34 @@ bool EdgeCheck::motion_clear(const VectorXd& a, const VectorXd& b, double margin
   q_ = dq_.cwiseAbs();
   way_.noalias() = levers_.shapes() * q_;
   pair_way_.noalias() = levers_.pairs() * q_;
-  // The end first, because it is the likeliest to be in collision.
-  if (!posture_clear(b, margin_, subjects)) return false;
-  place(a, first_);
-  return prove({0.0, 1.0, first_.view(), last_.view()}, subjects, 0);
+}
+
+std::optional<bool> EdgeCheck::prove(long postures) {
+  const long since = checks_;
+  do {
+    if (!next()) return false;
+    if (open_levels_ == 0) return true;
+  } while (checks_ - since < postures);
+  return std::nullopt;
+}
+
+bool EdgeCheck::next() {
+  if (begins_) {
+    begins_ = false;
+    // The end first, because it is the likeliest to be in collision.
+    if (!posture_clear(end_, margin_, subjects_)) return false;
+    place(start_, first_);
+    return examine({0.0, 1.0, first_.view(), last_.view()}, subjects_);
+  }
+  Level& whole = levels_[at(open_levels_ - 1)];
+  const Piece& piece = whole.piece;
+  const scene::Shapes middle = whole.arm.view();
+  const double half = 0.5 * piece.width;
+  const Piece next = whole.halves++ == 0 ? Piece{piece.at + half, half, middle, piece.to}
+                                         : Piece{piece.at, half, piece.from, middle};
+  if (!examine(next, whole.open)) return false;
+  while (open_levels_ > 0 && levels_[at(open_levels_ - 1)].halves == 2) --open_levels_;
+  return true;
 }
 
 // docs/theory.md (17.2)–(17.4): a sphere strays from its chord, all else from the middle of the
@@ -133,9 +161,9 @@ bool EdgeCheck::proved(const Piece& piece, int subject, const scene::Shapes& mid
              .distance > radius;
 }
 
-bool EdgeCheck::prove(const Piece& piece, std::span<const int> subjects, int depth) {
-  if (depth == depth_max) return false;
-  Level& level = levels_[at(depth)];
+bool EdgeCheck::examine(const Piece& piece, std::span<const int> subjects) {
+  if (open_levels_ == depth_max) return false;
+  Level& level = levels_[at(open_levels_)];
   q_ = start_ + (piece.at + 0.5 * piece.width) * dq_;
   place(q_, level.arm);
   const scene::Shapes middle = level.arm.view();
@@ -147,9 +175,10 @@ bool EdgeCheck::prove(const Piece& piece, std::span<const int> subjects, int dep
     level.open.push_back(subject);
   }
   if (level.open.empty()) return true;
-  const double half = 0.5 * piece.width;
-  return prove({piece.at + half, half, middle, piece.to}, level.open, depth + 1) &&
-         prove({piece.at, half, piece.from, middle}, level.open, depth + 1);
+  level.piece = piece;
+  level.halves = 0;
+  ++open_levels_;
+  return true;
 }
 
 }  // namespace hamelin::search

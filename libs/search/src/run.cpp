@@ -58,6 +58,7 @@ void Search::Run::begin(const Problem& problem, Query& query) {
   from_start_.clear();
   from_goal_.clear();
   tried_ = attempt_ = 0;
+  asked_ = false;
   bounds_ = box_;
   finder_.begin(problem_);
   phase_ = Phase::first_root;
@@ -71,8 +72,20 @@ void Search::Run::begin(const Problem& problem, Query& query) {
 
 bool Search::Run::advance(long checks) {
   const long until = used() + checks;
-  while (phase_ != Phase::ended && used() < until) step();
+  while (phase_ != Phase::ended && used() < until) {
+    if (!asked_) {
+      step();
+    } else if (const std::optional<bool> clear = query_->prove(until - used())) {
+      asked_ = false;
+      take_answer(*clear);
+    }
+  }
   return phase_ == Phase::ended;
+}
+
+void Search::Run::ask(const VectorXd& a, const VectorXd& b) {
+  query_->begin_motion(a, b);
+  asked_ = true;
 }
 
 void Search::Run::step() {
@@ -80,19 +93,36 @@ void Search::Run::step() {
     case Phase::first_root:
       return find_first_root();
     case Phase::straight:
-      return try_straight();
+      return ask(problem_.start, roots_[tried_].q);
     case Phase::grow:
       return grow();
     case Phase::connect:
       return connect();
     case Phase::shorten:
-      if (shortening_.step(*query_, rng_)) {
-        improve_until_ = used() + settings_.improve_checks;
-        phase_ = Phase::improve;
-      }
-      return;
+      return shorten();
     case Phase::improve:
       return improve();
+    case Phase::ended:
+      return;
+  }
+}
+
+void Search::Run::take_answer(bool clear) {
+  switch (phase_) {
+    case Phase::straight:
+      return take_straight(clear);
+    case Phase::grow:
+      if (!clear) return;
+      node_ = (grows_start_ ? from_start_ : from_goal_).add(sample_, near_);
+      phase_ = Phase::connect;
+      return;
+    case Phase::connect:
+      return take_connected(clear);
+    case Phase::shorten:
+    case Phase::improve:
+      if (shortening_.answer(clear)) ask(shortening_.from(), shortening_.to());
+      return;
+    case Phase::first_root:
     case Phase::ended:
       return;
   }
@@ -128,9 +158,9 @@ void Search::Run::set_margins() {
 }
 
 // The straight way to a root, which nothing can shorten.
-void Search::Run::try_straight() {
+void Search::Run::take_straight(bool clear) {
   const Root& root = roots_[tried_++];
-  if (query_->motion_clear(problem_.start, root.q)) {
+  if (clear) {
     MatrixXd points(root.q.size(), 2);
     points << problem_.start, root.q;
     return found_first(points);
@@ -174,25 +204,26 @@ void Search::Run::grow() {
   grows_start_ = from_start_.size() <= from_goal_.size();
   Tree& tree = grows_start_ ? from_start_ : from_goal_;
   draw();
-  const int near = tree.nearest(sample_);
-  at_ = tree.q(near);
+  near_ = tree.nearest(sample_);
+  at_ = tree.q(near_);
   const double distance = weighted_distance(weights_, at_, sample_);
   if (distance < met) return;
   if (distance > range) sample_ = at_ + range / distance * (sample_ - at_);
-  if (!query_->motion_clear(at_, sample_)) return;
-  node_ = tree.add(sample_, near);
-  phase_ = Phase::connect;
+  ask(at_, sample_);
 }
 
 // The other tree tries the whole line to the new node.
 void Search::Run::connect() {
+  const Tree& other = grows_start_ ? from_goal_ : from_start_;
+  near_ = other.nearest(sample_);
+  at_ = other.q(near_);
+  if (weighted_distance(weights_, at_, sample_) < met) return take_connected(true);
+  ask(at_, sample_);
+}
+
+void Search::Run::take_connected(bool clear) {
   phase_ = Phase::grow;
-  Tree& other = grows_start_ ? from_goal_ : from_start_;
-  const int near = other.nearest(sample_);
-  at_ = other.q(near);
-  const bool same = weighted_distance(weights_, at_, sample_) < met;
-  if (!same && !query_->motion_clear(at_, sample_)) return;
-  grows_start_ ? join(node_, near) : join(near, node_);
+  if (clear) grows_start_ ? join(node_, near_) : join(near_, node_);
 }
 
 void Search::Run::join(int in_start, int in_goal) {
@@ -211,15 +242,24 @@ void Search::Run::found_first(const MatrixXd& points) {
   path_.planned = points;
   path_.first_checks = used();
   shortening_.begin(points);
-  phase_ = settings_.shortens ? Phase::shorten : Phase::improve;
-  improve_until_ = 0;
+  phase_ = Phase::shorten;
+}
+
+void Search::Run::shorten() {
+  if (!shortening_.shortened()) {
+    if (shortening_.propose(rng_)) ask(shortening_.from(), shortening_.to());
+    return;
+  }
+  improve_until_ = used() + settings_.improve_checks;
+  phase_ = Phase::improve;
 }
 
 void Search::Run::improve() {
   if (used() >= improve_until_ || shortening_.points().cols() <= 2) return finish();
-  const long before = used();
-  shortening_.improve(*query_, rng_);
-  if (used() == before) --improve_until_;  // a search must end although nothing was tried
+  if (shortening_.propose(rng_))
+    ask(shortening_.from(), shortening_.to());
+  else
+    --improve_until_;  // a search must end although nothing is tried
 }
 
 void Search::Run::next_margins() {

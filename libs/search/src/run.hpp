@@ -9,7 +9,8 @@
 
 namespace hamelin::search {
 
-/// One search, which continues motion by motion: docs/theory.md, chapter 17.
+/// One search, docs/theory.md, chapter 17. Each step chooses a motion; when that is proved or not,
+/// the search goes on with the answer.
 class Search::Run {
  public:
   Run(const model::Model& model, const Settings& settings);
@@ -24,15 +25,19 @@ class Search::Run {
  private:
   enum class Phase { first_root, straight, grow, connect, shorten, improve, ended };
   void step();
+  void take_answer(bool clear);
+  void ask(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
   void find_first_root();
   /// Takes up the search again with the next, smaller margin. Ends it if there is none.
   void next_margins();
   void add_root(const Root& root);
   void set_margins();
-  void try_straight();
+  void take_straight(bool clear);
   void look_for_roots();
   void grow();
   void connect();
+  void take_connected(bool clear);
+  void shorten();
   void draw();
   void join(int in_start, int in_goal);
   void found_first(const Eigen::MatrixXd& points);
@@ -51,7 +56,8 @@ class Search::Run {
   Query* query_ = nullptr;
   Rng rng_{0};
   Phase phase_ = Phase::ended;
-  long before_ = 0;  ///< checks of the query
+  bool asked_ = false;  ///< a motion is being proved
+  long before_ = 0;     ///< checks of the query
   double start_clearance_ = 0.0, self_most_ = 0.0;
   std::size_t attempt_ = 0;  ///< of the margins
   std::vector<Root> roots_;
@@ -59,6 +65,7 @@ class Search::Run {
   long next_root_ = 0, improve_until_ = 0;
   std::optional<Margins> margins_;
   bool grows_start_ = true;
+  int near_ = 0;  ///< node from which a motion leads to the sample
   int node_ = 0;  ///< that the other tree is to be connected with
   Eigen::VectorXd sample_, at_;
   Path path_;

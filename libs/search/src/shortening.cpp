@@ -48,13 +48,23 @@ void Shortening::take_kept() {
   for (Index i = 0; i + 1 < count_; ++i) length_ += (path_.col(i + 1) - path_.col(i)).norm();
 }
 
-bool Shortening::step(Query& query, Rng& rng) {
-  if (phase_ == Phase::ended || count_ <= 2) return true;
-  if (phase_ == Phase::cut)
-    cut(query, rng);
-  else
-    skip(query);
-  return phase_ == Phase::ended || count_ <= 2;
+bool Shortening::propose(Rng& rng) {
+  if (count_ <= 2) return false;
+  if (phase_ == Phase::improve) return propose_improvement(rng);
+  return phase_ == Phase::cut ? propose_cut(rng) : propose_skip();
+}
+
+bool Shortening::answer(bool clear) {
+  if (phase_ == Phase::improve) return answer_improvement(clear);
+  if (phase_ == Phase::cut) {
+    if (clear) replace(nullptr);
+    end_cut();
+  } else if (clear) {
+    keep_skip();
+  } else {
+    to_ = (from_ + to_) / 2;
+  }
+  return false;
 }
 
 void Shortening::begin_skip() {
@@ -64,53 +74,85 @@ void Shortening::begin_skip() {
   to_ = count_ - 1;
 }
 
-// Tries the line from the way-point that was kept last to another one.
-void Shortening::skip(Query& query) {
+// The line from the way-point that was kept last to another one.
+bool Shortening::propose_skip() {
   p_ = path_.col(from_);
   r_ = path_.col(to_);
-  if (to_ > from_ + 1 && !query.motion_clear(p_, r_)) {
-    to_ = (from_ + to_) / 2;
-    return;
-  }
+  if (to_ > from_ + 1) return true;
+  keep_skip();
+  return false;
+}
+
+void Shortening::keep_skip() {
   from_ = std::max(to_, from_ + 1);
   to_ = count_ - 1;
   kept_.col(kept_count_++) = path_.col(from_);
   if (from_ + 1 < count_) return;
   take_kept();
-  phase_ = phase_ == Phase::skip ? Phase::cut : Phase::ended;
+  phase_ = phase_ == Phase::skip ? Phase::cut : Phase::improve;
 }
 
-void Shortening::cut(Query& query, Rng& rng) {
-  const double along = draw_places(rng);
-  if (a_.after != b_.after && along - (b_.q - a_.q).norm() >= least_gain * length_ &&
-      query.motion_clear(a_.q, b_.q))
-    replace(nullptr);
+bool Shortening::propose_cut(Rng& rng) {
+  draw_places(rng);
+  p_ = a_.q;
+  r_ = b_.q;
+  if (a_.after != b_.after && gains((r_ - p_).norm())) return true;
+  end_cut();
+  return false;
+}
+
+void Shortening::end_cut() {
   if (++cuts_ < cuts_max) return;
   phase_ = Phase::skip_again;
   begin_skip();
 }
 
-void Shortening::improve(Query& query, Rng& rng) {
-  if (count_ <= 2) return;
-  const double along = draw_places(rng);
-  if (a_.after == b_.after) return;
-  const double deviation = via_spread * along / std::sqrt(static_cast<double>(via_.size()));
+bool Shortening::propose_improvement(Rng& rng) {
+  draw_places(rng);
+  if (a_.after == b_.after) return false;
+  const double deviation = via_spread * along_ / std::sqrt(static_cast<double>(via_.size()));
   for (Index j = 0; j < via_.size(); ++j)
     via_[j] = 0.5 * (a_.q[j] + b_.q[j]) + deviation * rng.normal();
-  const auto gains = [&](double length) { return along - length >= least_gain * length_; };
-  if (gains((b_.q - a_.q).norm()) && query.motion_clear(a_.q, b_.q))
-    replace(nullptr);
-  else if (gains((via_ - a_.q).norm() + (b_.q - via_).norm()) && query.motion_clear(a_.q, via_) &&
-           query.motion_clear(via_, b_.q))
-    replace(&via_);
+  line_ = Line::direct;
+  p_ = a_.q;
+  r_ = b_.q;
+  return gains((r_ - p_).norm()) || propose_via();
 }
 
-double Shortening::draw_places(Rng& rng) {
+bool Shortening::propose_via() {
+  line_ = Line::to_via;
+  p_ = a_.q;
+  r_ = via_;
+  return gains((via_ - a_.q).norm() + (b_.q - via_).norm());
+}
+
+bool Shortening::answer_improvement(bool clear) {
+  switch (line_) {
+    case Line::direct:
+      if (!clear) return propose_via();
+      replace(nullptr);
+      return false;
+    case Line::to_via:
+      line_ = Line::from_via;
+      p_ = via_;
+      r_ = b_.q;
+      return clear;
+    case Line::from_via:
+      if (clear) replace(&via_);
+  }
+  return false;
+}
+
+bool Shortening::gains(double length) const {
+  return along_ - length >= least_gain * length_;
+}
+
+void Shortening::draw_places(Rng& rng) {
   double s = rng.uniform(0.0, length_), t = rng.uniform(0.0, length_);
   if (s > t) std::swap(s, t);
   place_at(s, a_);
   place_at(t, b_);
-  return t - s;
+  along_ = t - s;
 }
 
 void Shortening::place_at(double s, Place& out) const {

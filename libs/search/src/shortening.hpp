@@ -2,13 +2,12 @@
 #include <Eigen/Core>
 
 #include "hamelin/core/rng.hpp"
-#include "hamelin/search/query.hpp"
 
 namespace hamelin::search {
 
-/// Shortens a path by straight lines that are proved, one motion at a time: from each way-point to
-/// the farthest that it can see, then between random places, then the first again; and improves it
-/// for as long as asked, by random vias beside it. Lengths are Euclidean.
+/// Shortens a path by straight lines that are proved: from each way-point to the farthest that it
+/// can see, then between random places, then the first again. From then on it is improved by random
+/// vias beside it. Lengths are Euclidean. Lines are proposed, and proved by others.
 /// No allocation with paths of up to 256 points.
 class Shortening {
  public:
@@ -16,25 +15,37 @@ class Shortening {
 
   /// @param points dof × way-points
   void begin(const Eigen::Ref<const Eigen::MatrixXd>& points);
-  /// Tries one line. @return whether shortening has ended
-  [[nodiscard]] bool step(Query& query, Rng& rng);
-  /// Tries one cut or one via between two places of the path.
-  void improve(Query& query, Rng& rng);
+  /// Whether all that shortens was tried.
+  [[nodiscard]] bool shortened() const noexcept { return phase_ == Phase::improve || count_ <= 2; }
+  /// Chooses the next line. @return whether there is one to be proved, from() to()
+  [[nodiscard]] bool propose(Rng& rng);
+  [[nodiscard]] const Eigen::VectorXd& from() const noexcept { return p_; }
+  [[nodiscard]] const Eigen::VectorXd& to() const noexcept { return r_; }
+  /// Takes the answer for this line. @return whether there is another one that belongs to it
+  [[nodiscard]] bool answer(bool clear);
   /// dof × way-points.
   [[nodiscard]] auto points() const { return path_.leftCols(count_); }
 
  private:
-  enum class Phase { skip, cut, skip_again, ended };
+  enum class Phase { skip, cut, skip_again, improve };
+  /// The line that was proposed to improve the path.
+  enum class Line { direct, to_via, from_via };
   /// A place on the path: the way-point before it, and where it is.
   struct Place {
     Eigen::Index after = 0;
     Eigen::VectorXd q;
   };
   void begin_skip();
-  void skip(Query& query);
-  void cut(Query& query, Rng& rng);
-  /// Draws two places. @return their distance along the path
-  double draw_places(Rng& rng);
+  [[nodiscard]] bool propose_skip();
+  void keep_skip();
+  [[nodiscard]] bool propose_cut(Rng& rng);
+  void end_cut();
+  [[nodiscard]] bool propose_improvement(Rng& rng);
+  [[nodiscard]] bool propose_via();
+  [[nodiscard]] bool answer_improvement(bool clear);
+  /// Whether lines of this length in place of the stretch between the two places are worth while.
+  [[nodiscard]] bool gains(double length) const;
+  void draw_places(Rng& rng);
   void place_at(double s, Place& out) const;
   /// Replaces the stretch between the two places by a line, or by lines to a via and on.
   void replace(const Eigen::VectorXd* via);
@@ -44,10 +55,12 @@ class Shortening {
   Eigen::MatrixXd path_, kept_;  ///< of which the first columns count
   Eigen::Index count_ = 0, kept_count_ = 0;
   double length_ = 0.0;
-  Phase phase_ = Phase::ended;
+  Phase phase_ = Phase::improve;
+  Line line_ = Line::direct;
   Eigen::Index from_ = 0, to_ = 0;  ///< of the line to be tried next, while points are left out
   int cuts_ = 0;
-  Place a_, b_;
+  Place a_, b_;         ///< that were drawn
+  double along_ = 0.0;  ///< the path between them
   Eigen::VectorXd via_, p_, r_;
 };
 

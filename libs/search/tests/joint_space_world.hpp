@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <algorithm>
-#include <limits>
+#include <optional>
 #include <vector>
 
 #include "hamelin/search/search.hpp"
@@ -24,10 +24,18 @@ class JointSpaceWorld final : public search::Query {
   }
   double self_clearance(const Eigen::VectorXd&, double most_m) override { return most_m; }
   void set_margins(const search::Margins& margins) override { margins_ = margins; }
-  // Proves a motion as a whole, or its halves where the margins vary.
-  bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) override {
-    ++checks_;
-    return clear(a, b);
+  void begin_motion(const Eigen::VectorXd& a, const Eigen::VectorXd& b) override {
+    a_ = a;
+    b_ = b;
+    open_checks_ = motion_checks;
+  }
+  // Takes so many checks for each motion, and in the last of them proves it.
+  std::optional<bool> prove(long checks) override {
+    const long made = std::min(std::max(checks, 1L), open_checks_);
+    checks_ += made;
+    open_checks_ -= made;
+    if (open_checks_ > 0) return std::nullopt;
+    return clear(a_, b_);
   }
   [[nodiscard]] long checks() const override { return checks_; }
 
@@ -44,6 +52,8 @@ class JointSpaceWorld final : public search::Query {
   }
 
  private:
+  static constexpr long motion_checks = 3;
+  // Proves a motion as a whole, or its halves where the margins vary.
   bool clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
     const double least = margins_.least(a, b),
                  most = std::max(margins_.required(a), margins_.required(b));
@@ -54,7 +64,8 @@ class JointSpaceWorld final : public search::Query {
 
   search::Margins margins_{0.0};
   std::vector<Ball> balls_;
-  long checks_ = 0;
+  Eigen::VectorXd a_, b_;  // of the motion that is proved
+  long open_checks_ = 0, checks_ = 0;
 };
 
 }  // namespace hamelin::test

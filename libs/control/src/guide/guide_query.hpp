@@ -31,10 +31,11 @@ class GuideQuery final : public search::Query {
     return edges_.self_clearance(q, most_m);
   }
   void set_margins(const search::Margins& margins) override { lines_.set_margins(margins); }
-  [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) override {
+  void begin_motion(const Eigen::VectorXd& a, const Eigen::VectorXd& b) override {
     poll();
-    return lines_.motion_clear(a, b);
+    lines_.begin_motion(a, b);
   }
+  [[nodiscard]] std::optional<bool> prove(long checks) override { return lines_.prove(checks); }
   [[nodiscard]] long checks() const override { return lines_.checks() + clearances_; }
 
   /// A function to be called now and then during searches. It may throw, which ends the search.

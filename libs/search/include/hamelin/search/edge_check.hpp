@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -44,7 +45,19 @@ class EdgeCheck {
   /// @param subjects shapes by their index in Model::shapes(), pairs by their index in
   ///        SelfField::pairs() plus the number of shapes
   [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
-                                  double margin_m, std::span<const int> subjects);
+                                  double margin_m, std::span<const int> subjects) {
+    begin_motion(a, b, margin_m, subjects);
+    return *prove(std::numeric_limits<long>::max());
+  }
+  /// Begins such a proof, in place of any that was begun before. @param subjects must stay
+  void begin_motion(const Eigen::VectorXd& a, const Eigen::VectorXd& b, double margin_m,
+                    std::span<const int> subjects);
+  void begin_motion(const Eigen::VectorXd& a, const Eigen::VectorXd& b, double margin_m) {
+    begin_motion(a, b, margin_m, all_);
+  }
+  /// Continues what was begun, for so many postures, at least one and at most two more.
+  /// @return whether the motion is clear, or nothing as long as that is open
+  [[nodiscard]] std::optional<bool> prove(long postures);
   /// Whether all distances are at least the margin at q.
   [[nodiscard]] bool posture_clear(const Eigen::VectorXd& q, double margin_m) {
     return posture_clear(q, margin_m, all_);
@@ -54,22 +67,27 @@ class EdgeCheck {
 
  private:
   static constexpr int depth_max = 16;
-  /// The arm in the middle of a piece, and what is not proved there.
-  struct Level {
-    scene::PlacedShapes arm;
-    std::vector<int> open;  ///< shapes, and behind them pairs of parts
-  };
   struct Piece {
     double at, width;  ///< start and width in s, 0 to 1
     scene::Shapes from, to;
+  };
+  /// A piece of which something is not proved.
+  struct Level {
+    scene::PlacedShapes arm;  ///< in the middle
+    std::vector<int> open;    ///< shapes, and behind them pairs of parts
+    Piece piece;
+    int halves = 0;  ///< that were examined
   };
   void place(const Eigen::VectorXd& q, scene::PlacedShapes& arm);
   [[nodiscard]] bool posture_clear(const Eigen::VectorXd& q, double margin_m,
                                    std::span<const int> subjects);
   /// Whether a shape or pair keeps the margin at a posture.
   [[nodiscard]] bool keeps_margin(int subject, const scene::Shapes& arm, double margin_m);
-  /// @param subjects what is to be proved on the piece
-  [[nodiscard]] bool prove(const Piece& piece, std::span<const int> subjects, int depth);
+  /// Examines the ends and the whole, or the next half of the piece that is open last.
+  /// @return false if there is no proof
+  [[nodiscard]] bool next();
+  /// Examines a piece, and adds a level if something is open. @return false if there is no proof
+  [[nodiscard]] bool examine(const Piece& piece, std::span<const int> subjects);
   [[nodiscard]] bool proved(const Piece& piece, int subject, const scene::Shapes& middle);
   /// How far a shape, or the shapes of a pair, may stray on a piece from where they were measured.
   [[nodiscard]] double stray(const Piece& piece, int subject) const;
@@ -85,9 +103,12 @@ class EdgeCheck {
   std::vector<std::int32_t> hints_;  ///< of each shape, for the map
   std::vector<int> all_;             ///< all subjects
   dynamics::Workspace ws_;
-  Eigen::VectorXd start_, dq_, q_, curvature_, bend_, way_, pair_way_;
+  Eigen::VectorXd start_, end_, dq_, q_, curvature_, bend_, way_, pair_way_;
   scene::PlacedShapes first_, last_;
+  std::span<const int> subjects_;  ///< of the proof that goes on
   std::vector<Level> levels_;
+  int open_levels_ = 0;
+  bool begins_ = true;  ///< nothing was examined yet
   long checks_ = 0;
 };
 

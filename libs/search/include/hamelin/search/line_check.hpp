@@ -1,6 +1,8 @@
 #pragma once
 #include <Eigen/Core>
+#include <limits>
 #include <memory>
+#include <optional>
 
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/environment.hpp"
@@ -36,7 +38,15 @@ class LineCheck {
   void set_margins(const Margins& margins);
   /// Whether the arm is proved to keep more than the margins on the straight joint motion from a to
   /// b (dof numbers each [rad or m]); false also if there is no proof.
-  [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
+  [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+    begin_motion(a, b);
+    return *prove(std::numeric_limits<long>::max());
+  }
+  /// Begins such a proof, in place of any that was begun before.
+  void begin_motion(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
+  /// Continues what was begun, for so many checks, at least one and at most two more.
+  /// @return whether the motion is clear, or nothing as long as that is open
+  [[nodiscard]] std::optional<bool> prove(long checks);
   /// Batches of 16 pieces and postures of exact checks since the start, for limits of searches.
   [[nodiscard]] long checks() const noexcept;
 

@@ -1,5 +1,7 @@
 #pragma once
 #include <Eigen/Core>
+#include <limits>
+#include <optional>
 
 #include "hamelin/search/margins.hpp"
 
@@ -20,9 +22,17 @@ class Query {
   [[nodiscard]] virtual double self_clearance(const Eigen::VectorXd& q, double most_m) = 0;
   /// What the following motions must keep.
   virtual void set_margins(const Margins& margins) = 0;
-  /// Whether the arm is proved to keep more than the margins on the straight joint motion from a to
-  /// b, ends included.
-  [[nodiscard]] virtual bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) = 0;
+  /// Begins to prove that the arm keeps more than the margins on the straight joint motion from a
+  /// to b, ends included, in place of any proof that was begun before.
+  virtual void begin_motion(const Eigen::VectorXd& a, const Eigen::VectorXd& b) = 0;
+  /// Continues what was begun, for about so many checks, at least one.
+  /// @return whether the motion is clear, or nothing as long as that is open
+  [[nodiscard]] virtual std::optional<bool> prove(long checks) = 0;
+  /// Both, to the end.
+  [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+    begin_motion(a, b);
+    return *prove(std::numeric_limits<long>::max());
+  }
   /// How much work the calls so far took: the arm was placed so many times.
   [[nodiscard]] virtual long checks() const = 0;
 };

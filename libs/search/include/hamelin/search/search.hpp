@@ -25,7 +25,6 @@ struct Settings {
   long checks_max = 200000;       ///< after which a search ends without a path
   long improve_checks = 0;        ///< for how many checks a path is improved after it was shortened
   std::uint64_t seed = 1;
-  bool shortens = true;  ///< whether the path is shortened
 };
 
 /// A search to be made.
@@ -74,7 +73,7 @@ class Search {
   /// Begins a search. @param query must stay as it is until the search has ended
   /// @throws Error invalid for a start or goals that do not fit the arm or are not finite
   void begin(const Problem& problem, Query& query);
-  /// Continues for so many checks, and for less than one motion or root more.
+  /// Continues for so many checks, and for at most a few postures or one batch of roots more.
   /// @return whether the search has ended
   bool advance(long checks);
   /// The path of a search that has ended.
