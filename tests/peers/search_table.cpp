@@ -111,7 +111,6 @@ void print_slices(std::vector<double> us) {
 struct Timed {
   search::Path path;
   double first_s = 0.0, all_s = 0.0;
-  long checks = 0;
   std::vector<double> slices_us;
 };
 
@@ -119,7 +118,6 @@ Timed search_timed(Rig& rig, int seed, const Options& options) {
   Timed out;
   search::Search search(rig.arm, settings_of(rig, seed, options));
   rig.query.refresh(0.0);
-  const long before = rig.query.checks();
   const double since = cpu_s();
   search.begin({rig.scene.start_q, {rig.scene.goals.front()}, 1}, rig.query);
   double at = since;
@@ -131,7 +129,6 @@ Timed search_timed(Rig& rig, int seed, const Options& options) {
     if (out.first_s == 0.0 && search.path().planned.cols() > 0) out.first_s = now - since;
   }
   out.all_s = at - since;
-  out.checks = rig.query.checks() - before;
   out.path = search.path();
   return out;
 }
@@ -142,7 +139,7 @@ search::Path search_ours(Rig& rig, int seed, const Options& options, Figures& fi
                          std::vector<double>& slices_us) {
   Timed first = search_timed(rig, seed, options);
   const search::Path& path = first.path;
-  figures.add(path.found(), first.first_s, first.all_s, first.checks, path.length);
+  figures.add(path.found(), first.first_s, first.all_s, path.checks, path.length);
   for (int repeat = 1; repeat < 3; ++repeat) {
     const Timed again = search_timed(rig, seed, options);
     for (std::size_t i = 0; i < again.slices_us.size(); ++i)

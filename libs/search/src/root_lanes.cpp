@@ -82,25 +82,32 @@ void RootLanes::set_targets(const Targets& targets) {
       std::sin(std::clamp(reach_share * first.tolerance_rad, reach_least_rad, reach_most_rad)));
 }
 
-unsigned RootLanes::solve(const Targets& targets, MatrixXd& q) {
+double RootLanes::factor(Index joint) const {
+  const float turn = joints_[static_cast<std::size_t>(joint)].turn;
+  return turn == 0.0F ? 1.0 : static_cast<double>(turn);
+}
+
+double RootLanes::offset(Index joint) const {
+  const auto j = static_cast<std::size_t>(joint);
+  return joints_[j].turn == 0.0F ? 0.0 : joint_offset(model_, j);
+}
+
+void RootLanes::begin(const Targets& targets, const MatrixXd& q) {
   set_targets(targets);
-  const auto turn = [&](Index j) {
-    const float of = joints_[static_cast<std::size_t>(j)].turn;
-    return of == 0.0F ? 1.0 : static_cast<double>(of);
-  };
-  const auto offset = [&](Index j) {
-    const auto k = static_cast<std::size_t>(j);
-    return joints_[k].turn == 0.0F ? 0.0 : joint_offset(model_, k);
-  };
   for (Index j = 0; j < q.rows(); ++j)
     for (Index l = 0; l < q.cols(); ++l)
-      postures_->q[j][l] = static_cast<float>(turn(j) * q(j, l) + offset(j));
-  const unsigned near = kernels_.solve(chain_, *targets_, *postures_);
+      postures_->q[j][l] = static_cast<float>(factor(j) * q(j, l) + offset(j));
+}
+
+unsigned RootLanes::advance(int steps) {
+  return kernels_.advance(chain_, *targets_, *postures_, steps);
+}
+
+void RootLanes::write(MatrixXd& q) const {
   for (Index j = 0; j <= targets_->tip_link; ++j)
     for (Index l = 0; l < q.cols(); ++l)
-      q(j, l) = std::clamp(turn(j) * (static_cast<double>(postures_->q[j][l]) - offset(j)),
+      q(j, l) = std::clamp(factor(j) * (static_cast<double>(postures_->q[j][l]) - offset(j)),
                            box_.lower[j], box_.upper[j]);
-  return near;
 }
 
 }  // namespace hamelin::search

@@ -21,12 +21,18 @@ class RootLanes {
   /// Whether the lanes have room for the arm and its joint limits.
   [[nodiscard]] bool fits() const noexcept { return fits_; }
   /// @param targets in the world, all with the tolerances and `turns` of the first
-  /// @param q dof × lanes, in the box. Those of joints behind the tip stay
-  /// @return bits of the postures that came near to their targets
-  [[nodiscard]] unsigned solve(const Targets& targets, Eigen::MatrixXd& q);
+  /// @param q dof × lanes, in the box
+  void begin(const Targets& targets, const Eigen::MatrixXd& q);
+  /// Moves all postures by so many steps. @return bits of those that came near to their targets
+  [[nodiscard]] unsigned advance(int steps);
+  /// Writes the postures to what begin() was given. Those of joints behind the tip stay
+  void write(Eigen::MatrixXd& q) const;
 
  private:
   void set_targets(const Targets& targets);
+  /// The factor and the offset from a joint's position to the angle or position of its frame.
+  [[nodiscard]] double factor(Eigen::Index joint) const;
+  [[nodiscard]] double offset(Eigen::Index joint) const;
 
   const model::Model& model_;
   const dynamics::JointBox& box_;

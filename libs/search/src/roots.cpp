@@ -16,6 +16,7 @@ namespace {
 // Of each goal: attempts in all, attempts where nothing was found yet, and roots.
 constexpr int attempts_max = 64, attempts_for_one = 640;
 constexpr std::size_t roots_max = 6;
+constexpr int steps_max = 40, steps_at_once = 8;  // of a batch towards its targets
 // Share of the tolerance of a joint goal within which other places are drawn.
 constexpr double joint_tolerance_share = 0.9;
 // Share of a tip goal's tolerances within which other poses are drawn. Inverse kinematics takes the
@@ -61,7 +62,8 @@ Roots::Roots(const model::Model& model, const dynamics::JointBox& box, const Set
 
 void Roots::begin(const Problem& problem) {
   problem_ = &problem;
-  attempts_ = rounds_ = next_ = ordered_ = 0;
+  attempts_ = rounds_ = next_ = ordered_ = steps_ = 0;
+  checks_ = 0;
   goal_ = 0;
   found_.assign(problem.goals.size(), 0);
 }
@@ -75,7 +77,14 @@ bool Roots::tries(std::size_t roots) const noexcept {
 }
 
 bool Roots::attempt(Query& query, Rng& rng, Root& root) {
-  if (in_batch()) return at_tip(query, root);
+  if (steps_ > 0) {
+    continue_batch();
+    return false;
+  }
+  return next_ < ordered_ ? at_tip(query, root) : at_next_goal(query, rng, root);
+}
+
+bool Roots::at_next_goal(Query& query, Rng& rng, Root& root) {
   const std::size_t which = goal_;
   const scene::Goal& goal = problem_->goals[which];
   const bool joint = goal.type == scene::GoalType::joint;
@@ -111,10 +120,24 @@ void Roots::begin_batch(const scene::Goal& goal, Rng& rng) {
     box_.draw(rng, sample_);
     q_.col(l) = first ? problem_->start.cwiseMax(box_.lower).cwiseMin(box_.upper) : sample_;
   }
-  unsigned near = (1U << kernel::lanes) - 1U;
-  if (root_lanes_.fits()) near = root_lanes_.solve(targets_, q_);
-  next_ = 0;
-  ordered_ = 0;
+  if (!root_lanes_.fits()) return order_batch(kernel::all_lanes);
+  root_lanes_.begin(targets_, q_);
+  steps_ = steps_max;
+}
+
+void Roots::continue_batch() {
+  const unsigned near = root_lanes_.advance(steps_at_once);
+  checks_ += steps_at_once;
+  steps_ -= steps_at_once;
+  if (near == kernel::all_lanes) steps_ = 0;
+  if (steps_ > 0) return;
+  root_lanes_.write(q_);
+  order_batch(near);
+}
+
+// The postures that came near to their targets, those near the start first.
+void Roots::order_batch(unsigned near) {
+  next_ = ordered_ = 0;
   std::array<double, kernel::lanes> apart{};
   for (; near != 0; near &= near - 1U) {
     const int l = std::countr_zero(near);
@@ -138,6 +161,7 @@ double Roots::least_clearance() const noexcept {
 
 bool Roots::at_tip(Query& query, Root& root) {
   const int lane = order_[static_cast<std::size_t>(next_++)];
+  ++checks_;
   sample_ = q_.col(lane);
   if (!kinematics_.solve(targets_[static_cast<std::size_t>(lane)], sample_)) return false;
   const double least = std::max(1e-6, least_clearance());

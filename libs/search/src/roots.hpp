@@ -29,13 +29,18 @@ class Roots {
   /// Whether more attempts are worth while, with so many roots.
   [[nodiscard]] bool tries(std::size_t roots) const noexcept;
   /// Whether the next attempt is one more of a batch.
-  [[nodiscard]] bool in_batch() const noexcept { return next_ < ordered_; }
+  [[nodiscard]] bool in_batch() const noexcept { return steps_ > 0 || next_ < ordered_; }
   /// @param root receives a clear one, with clearance above 0 @return whether there is one
   [[nodiscard]] bool attempt(Query& query, Rng& rng, Root& root);
+  /// Steps of inverse kinematics, besides the checks of the query, since begin().
+  [[nodiscard]] long checks() const noexcept { return checks_; }
 
  private:
   [[nodiscard]] bool at_joints(const scene::Goal& goal, Query& query, Rng& rng, Root& root) const;
+  [[nodiscard]] bool at_next_goal(Query& query, Rng& rng, Root& root);
   void begin_batch(const scene::Goal& goal, Rng& rng);
+  void continue_batch();
+  void order_batch(unsigned near);
   [[nodiscard]] bool at_tip(Query& query, Root& root);
   [[nodiscard]] double least_clearance() const noexcept;
 
@@ -48,6 +53,8 @@ class Roots {
   std::vector<char> found_;        ///< joint goals that need no other root
   std::size_t goal_ = 0;           ///< of the next batch
   int attempts_ = 0, rounds_ = 0;  ///< of all goals; and how often each had its turn
+  long checks_ = 0;
+  int steps_ = 0;  ///< that the batch may still take towards its targets
   RootLanes::Targets targets_;
   Eigen::MatrixXd q_;                     ///< the batch
   std::array<int, kernel::lanes> order_;  ///< its postures that are worth an attempt

@@ -92,6 +92,8 @@ void Search::Run::step() {
   switch (phase_) {
     case Phase::first_root:
       return find_first_root();
+    case Phase::more_roots:
+      return find_more_roots();
     case Phase::straight:
       return ask(problem_.start, roots_[tried_].q);
     case Phase::grow:
@@ -123,6 +125,7 @@ void Search::Run::take_answer(bool clear) {
       if (shortening_.answer(clear)) ask(shortening_.from(), shortening_.to());
       return;
     case Phase::first_root:
+    case Phase::more_roots:
     case Phase::ended:
       return;
   }
@@ -171,15 +174,17 @@ void Search::Run::take_straight(bool clear) {
   phase_ = Phase::grow;
 }
 
-void Search::Run::look_for_roots() {
-  next_root_ = used() + root_checks;
+// Until a root was found, or a batch is at its end.
+void Search::Run::find_more_roots() {
   Root root;
-  bool found = finder_.attempt(*query_, rng_, root);
-  while (!found && finder_.in_batch()) found = finder_.attempt(*query_, rng_, root);
-  if (!found) return;
-  add_root(root);
-  set_margins();
-  phase_ = Phase::straight;
+  if (finder_.attempt(*query_, rng_, root)) {
+    add_root(root);
+    set_margins();
+    phase_ = Phase::straight;
+  } else if (!finder_.in_batch()) {
+    next_root_ = used() + root_checks;
+    phase_ = Phase::grow;
+  }
 }
 
 void Search::Run::draw() {
@@ -200,7 +205,10 @@ void Search::Run::grow() {
   const double share = attempts[attempt_].used;
   if (static_cast<double>(used()) >= share * static_cast<double>(settings_.checks_max))
     return next_margins();
-  if (used() >= next_root_ && finder_.tries(roots_.size())) return look_for_roots();
+  if (used() >= next_root_ && finder_.tries(roots_.size())) {
+    phase_ = Phase::more_roots;
+    return;
+  }
   grows_start_ = from_start_.size() <= from_goal_.size();
   Tree& tree = grows_start_ ? from_start_ : from_goal_;
   draw();

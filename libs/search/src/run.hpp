@@ -23,7 +23,7 @@ class Search::Run {
   [[nodiscard]] const Path& path() const noexcept { return path_; }
 
  private:
-  enum class Phase { first_root, straight, grow, connect, shorten, improve, ended };
+  enum class Phase { first_root, more_roots, straight, grow, connect, shorten, improve, ended };
   void step();
   void take_answer(bool clear);
   void ask(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
@@ -33,7 +33,7 @@ class Search::Run {
   void add_root(const Root& root);
   void set_margins();
   void take_straight(bool clear);
-  void look_for_roots();
+  void find_more_roots();
   void grow();
   void connect();
   void take_connected(bool clear);
@@ -44,7 +44,7 @@ class Search::Run {
   void improve();
   void finish();
   void end(std::string cause);
-  [[nodiscard]] long used() const { return query_->checks() - before_; }
+  [[nodiscard]] long used() const { return query_->checks() - before_ + finder_.checks(); }
 
   const Settings& settings_;
   Eigen::VectorXd weights_;

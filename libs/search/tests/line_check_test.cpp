@@ -257,6 +257,37 @@ TEST_CASE("an arm with more than the lanes hold is checked exactly", "[search][l
   CHECK(rig.line.counts().whole == 60);
 }
 
+TEST_CASE("a proof that goes on check by check has the same answer and the same work",
+          "[search][line]") {
+  model::ChainOptions longer;
+  longer.links = 18;
+  longer.length_m = 0.06;
+  for (const model::Model& arm : {model::Model(panda()), model::Model(model::make_chain(longer))}) {
+    RigOptions options;
+    options.self = options.obstacles = false;
+    LineRig rig(arm.robot(), options), other(arm.robot(), options);
+    int open = 0;
+    for (int i = 0; i < 100; ++i) {
+      const VectorXd a = rig.random_q();
+      const VectorXd b = a + rig.rng.uniform(0.02, 0.5) * (rig.random_q() - a);
+      search::Margins margins(0.01);
+      margins.add(a, 0.002, 0.02, 0.3);
+      for (LineRig* each : {&rig, &other}) each->line.set_margins(margins);
+      const bool clear = rig.line.motion_clear(a, b);
+      other.line.begin_motion(a, b);
+      std::optional<bool> answer;
+      for (long before = other.line.checks(); !answer; before = other.line.checks()) {
+        answer = other.line.prove(1);
+        REQUIRE(other.line.checks() - before <= 3);
+        open += answer ? 0 : 1;
+      }
+      REQUIRE(*answer == clear);
+      REQUIRE(other.line.checks() == rig.line.checks());
+    }
+    CHECK(open > 50);
+  }
+}
+
 TEST_CASE("lines have the same answers and the same work on all instruction sets",
           "[search][line]") {
   const Isa usual = default_isa();

@@ -64,13 +64,15 @@ void GuideSearch::answer() {
   out->number = request_.number;
   out->snapshot = query_.refresh(request_.time_s);
   out->kept = still_clear();
+  out->checks = query_.checks() - before;
   try {
-    if (!out->kept)
+    if (!out->kept) {
       out->path = search_.search({request_.q, {request_.goal}, request_.search}, query_);
+      out->checks += out->path.checks;
+    }
   } catch (const std::exception& e) {  // on a thread of its own nobody could catch it
     out->path.cause = e.what();
   }
-  out->checks = query_.checks() - before;
   answers_.publish(std::move(out));
 }
 

@@ -4,6 +4,7 @@ namespace hamelin::search::kernel {
 
 /// Postures that are computed at once, on every instruction set.
 inline constexpr int lanes = 16;
+inline constexpr unsigned all_lanes = (1U << lanes) - 1U;
 /// Longer arms are computed one posture at a time.
 inline constexpr int joints_max = 16;
 

@@ -20,9 +20,10 @@ struct RootPostures {
 };
 
 struct RootKernels {
-  /// Damped least squares, docs/theory.md (15.16). @return bits of the lanes that are near enough
-  unsigned (*solve)(const Chain& chain, const RootTargets& targets,
-                    RootPostures& postures) noexcept;
+  /// So many steps of damped least squares, docs/theory.md (15.16), fewer if all lanes are near.
+  /// @return bits of the lanes that are near enough
+  unsigned (*advance)(const Chain& chain, const RootTargets& targets, RootPostures& postures,
+                      int steps) noexcept;
 };
 
 }  // namespace hamelin::search::kernel

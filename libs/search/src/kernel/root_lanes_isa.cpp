@@ -9,7 +9,6 @@ inline namespace HAMELIN_ISA_NAMESPACE {
 
 namespace {
 
-constexpr int iterations_max = 40;
 constexpr float rotation_length = 0.25F;  // makes a rotation comparable with a displacement [m]
 constexpr float root_damping = 1e-4F;     // added to J Jᵀ [m²]
 constexpr float largest_step = 0.3F;      // of any joint [rad or m]
@@ -35,17 +34,15 @@ class Solve {
   HAMELIN_INLINE Solve(const Chain& chain, const RootTargets& targets, RootPostures& postures)
       : chain_(chain), targets_(targets), postures_(postures) {}
 
-  unsigned run() {
-    constexpr unsigned all = (1U << lanes) - 1U;
-    for (int i = 0; i < iterations_max; ++i) {
+  unsigned run(int steps) {
+    for (int i = 0;; ++i) {
       place();
       const unsigned near = measure();
-      if (near == all || i + 1 == iterations_max) return near;
+      if (near == all_lanes || i == steps) return near;
       set_jacobian();
       set_weights();
       move(near);
     }
-    return 0;
   }
 
  private:
@@ -142,14 +139,15 @@ class Solve {
   Reals error_[6], weights_[6], jacobian_[6][joints_max];
 };
 
-unsigned solve(const Chain& chain, const RootTargets& targets, RootPostures& postures) noexcept {
-  return Solve(chain, targets, postures).run();
+unsigned advance(const Chain& chain, const RootTargets& targets, RootPostures& postures,
+                 int steps) noexcept {
+  return Solve(chain, targets, postures).run(steps);
 }
 
 }  // namespace
 
 extern const RootKernels root_kernels;
-constexpr RootKernels root_kernels{solve};
+constexpr RootKernels root_kernels{advance};
 
 }  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::search::kernel

@@ -43,7 +43,7 @@ struct Path {
   double length = 0.0;      ///< [rad or m], in the Euclidean norm
   Eigen::MatrixXd planned;  ///< what was found first, before it was shortened
   double margin_m = 0.0;    ///< the full margin that it keeps, see Settings::margin_m
-  long checks = 0;          ///< of the whole search
+  long checks = 0;          ///< of the whole search, with steps of inverse kinematics
   long first_checks = 0;    ///< until the first path was found
   int roots = 0;            ///< configurations at the goals
   long states = 0;          ///< nodes of the trees
