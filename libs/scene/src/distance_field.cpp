@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "hamelin/core/isa_kernels.hpp"
 #include "hamelin/scene/kernel/distance_transform.hpp"
@@ -332,9 +333,35 @@ void DistanceField::compute_all() {
     values_[i] = value[static_cast<std::size_t>(squares[i])];
 }
 
-void DistanceField::compute_near(const VoxelBox& changed) {
-  const VoxelBox to = common(corners(widened(changed, cap)), nodes_);
-  const VoxelBox from = common(corners(widened(changed, 2 * cap)), nodes_);
+// Where the voxels' bounds changed, the nodes are others: those that were there before keep their
+// values, and the others get theirs.
+void DistanceField::move_nodes() {
+  const VoxelBox before = std::exchange(nodes_, nodes_around(used_));
+  const VoxelBox kept = common(before, nodes_);
+  const std::vector<std::uint16_t> values = std::exchange(
+      values_, std::vector<std::uint16_t>(static_cast<std::size_t>(volume(nodes_)) + padding));
+  const std::ptrdiff_t row = before.hi[0] - before.lo[0];
+  const std::ptrdiff_t plane = row * (before.hi[1] - before.lo[1]);
+  for (std::int32_t z = kept.lo[2]; z < kept.hi[2]; ++z)
+    for (std::int32_t y = kept.lo[1]; y < kept.hi[1]; ++y)
+      std::copy_n(values.data() + (z - before.lo[2]) * plane + (y - before.lo[1]) * row +
+                      (kept.lo[0] - before.lo[0]),
+                  kept.hi[0] - kept.lo[0], &values_[index(kept.lo[0], y, z)]);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    VoxelBox below = nodes_, above = nodes_;
+    below.hi[axis] = kept.lo[axis];
+    above.lo[axis] = kept.hi[axis];
+    for (const VoxelBox& beside : {below, above})
+      if (!is_empty(beside)) compute(beside);
+  }
+}
+
+void DistanceField::compute(VoxelBox to) {
+  constexpr std::int32_t row_least = 16;
+  const std::int32_t lack = std::max(0, row_least - (to.hi[0] - to.lo[0]));
+  to.lo[0] = std::max(nodes_.lo[0], to.lo[0] - lack);
+  to.hi[0] = std::max(to.hi[0], std::min(nodes_.hi[0], to.lo[0] + row_least));
+  const VoxelBox from = common(widened(to, cap), nodes_);
   const std::vector<std::int16_t> squares = Transform(grid_, from, to).run();
   const auto& value = tables().value;
   const std::int16_t* square = squares.data();
@@ -371,12 +398,17 @@ bool DistanceField::change(std::span<const VoxelBox> free, std::span<const Voxel
   const std::vector<VoxelBox> changed = dirty.boxes();
   double work = 0.0;
   for (const VoxelBox& box : changed) work += Dirty::work(box);
-  if (!same(before, used_) || work > volume(nodes_)) {
-    if (!fits(used_)) return false;
+  if (!fits(used_)) return false;
+  if (is_empty(before) || is_empty(used_) || is_empty(common(before, used_)) ||
+      work > volume(nodes_)) {
     compute_all();
     return true;
   }
-  for (const VoxelBox& box : changed) compute_near(box);
+  if (!same(before, used_)) move_nodes();
+  for (const VoxelBox& box : changed) {
+    const VoxelBox near = common(corners(widened(box, cap)), nodes_);
+    if (!is_empty(near)) compute(near);
+  }
   return true;
 }
 

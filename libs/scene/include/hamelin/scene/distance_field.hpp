@@ -94,8 +94,11 @@ class DistanceField {
   [[nodiscard]] bool grow(std::span<const VoxelBox> occupied);
   /// Computes the distances of all nodes.
   void compute_all();
-  /// Computes the distances of the nodes within the cap of changed voxels.
-  void compute_near(const VoxelBox& changed);
+  /// Moves the box of the nodes to where it must be now. Those that were there before keep their
+  /// values.
+  void move_nodes();
+  /// Computes the distances of the nodes of a box, and of more where its rows are short.
+  void compute(VoxelBox to);
   struct Place;
   [[nodiscard]] Place place(const Eigen::Vector3d& p) const noexcept;
   [[nodiscard]] double bound_by_node(const Place& at) const noexcept;
