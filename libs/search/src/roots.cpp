@@ -57,6 +57,8 @@ Roots::Roots(const model::Model& model, const dynamics::JointBox& box, const Set
       weights_(weights),
       root_lanes_(model, box),
       kinematics_(model, box),
+      model_(model),
+      ws_(model),
       q_(Eigen::MatrixXd::Zero(model.dof(), kernel::lanes)),
       sample_(VectorXd::Zero(model.dof())) {}
 
@@ -74,6 +76,30 @@ bool Roots::tries(std::size_t roots) const noexcept {
     return false;
   return roots < roots_max * problem_->goals.size() &&
          (in_batch() || attempts_ < goals * (roots == 0 ? attempts_for_one : attempts_max));
+}
+
+bool Roots::take(const VectorXd& q, Query& query, Root& root) {
+  for (std::size_t i = 0; i < problem_->goals.size(); ++i) {
+    const scene::Goal& goal = problem_->goals[i];
+    if (!reaches(goal, q)) continue;
+    const bool joint = goal.type == scene::GoalType::joint;
+    const double least = std::max(1e-6, joint ? settings_.least_m : settings_.root_clearance_m);
+    root = {q, query.clearance(q, least)};
+    if (root.clearance < least) return false;
+    if (joint) found_[i] = 1;
+    return true;
+  }
+  return false;
+}
+
+bool Roots::reaches(const scene::Goal& goal, const VectorXd& q) {
+  if (goal.type == scene::GoalType::joint)
+    return (q - goal.q).lpNorm<Eigen::Infinity>() < goal.tolerance_rad;
+  dynamics::forward_kinematics(model_, ws_, q);
+  const geometry::SE3 tip = dynamics::tip_pose(model_, ws_);
+  return (tip.p() - goal.pose.p()).norm() < goal.tolerance_m &&
+         (goal.type != scene::GoalType::pose ||
+          Eigen::AngleAxisd(goal.pose.R().transpose() * tip.R()).angle() < goal.tolerance_rad);
 }
 
 bool Roots::attempt(Query& query, Rng& rng, Root& root) {

@@ -32,12 +32,16 @@ class Roots {
   [[nodiscard]] bool in_batch() const noexcept { return steps_ > 0 || next_ < ordered_; }
   /// @param root receives a clear one, with clearance above 0 @return whether there is one
   [[nodiscard]] bool attempt(Query& query, Rng& rng, Root& root);
+  /// Takes a configuration that is within the tolerances of a goal and clear as a root.
+  /// @return whether it is one
+  [[nodiscard]] bool take(const Eigen::VectorXd& q, Query& query, Root& root);
   /// Steps of inverse kinematics, besides the checks of the query, since begin().
   [[nodiscard]] long checks() const noexcept { return checks_; }
 
  private:
   [[nodiscard]] bool at_joints(const scene::Goal& goal, Query& query, Rng& rng, Root& root) const;
   [[nodiscard]] bool at_next_goal(Query& query, Rng& rng, Root& root);
+  [[nodiscard]] bool reaches(const scene::Goal& goal, const Eigen::VectorXd& q);
   void begin_batch(const scene::Goal& goal, Rng& rng);
   void continue_batch();
   void order_batch(unsigned near);
@@ -49,6 +53,8 @@ class Roots {
   const Eigen::VectorXd& weights_;
   RootLanes root_lanes_;
   dynamics::InverseKinematics kinematics_;
+  const model::Model& model_;
+  dynamics::Workspace ws_;
   const Problem* problem_ = nullptr;
   std::vector<char> found_;        ///< joint goals that need no other root
   std::size_t goal_ = 0;           ///< of the next batch

@@ -24,8 +24,9 @@ constexpr double limit_reserve = 1e-3;  // kept from joint limits [rad or m]
 constexpr double range = 0.5;           // the longest edge by which a tree grows
 // Share of the samples around the start or a root, where ways are often narrow, and their spread.
 constexpr double near_share = 0.3, near_spread = 0.5;
-constexpr double met = 1e-9;       // distance of configurations that count as one
-constexpr long root_checks = 200;  // after so many checks another root is looked for
+constexpr double near_known_share = 0.7;  // around the gap in a known path
+constexpr double met = 1e-9;              // distance of configurations that count as one
+constexpr long root_checks = 200;         // after so many checks another root is looked for
 constexpr std::size_t nodes = 4096;
 /// The margins that a search keeps one after the other, as shares of the full one, and the share of
 /// its checks that all of them up to this one may use.
@@ -58,7 +59,8 @@ void Search::Run::begin(const Problem& problem, Query& query) {
   from_start_.clear();
   from_goal_.clear();
   tried_ = attempt_ = 0;
-  asked_ = false;
+  asked_ = knows_ = follows_known_ = false;
+  tries_known_ = problem_.known.cols() > 0;
   bounds_ = box_;
   finder_.begin(problem_);
   phase_ = Phase::first_root;
@@ -96,6 +98,9 @@ void Search::Run::step() {
       return find_more_roots();
     case Phase::straight:
       return ask(problem_.start, roots_[tried_].q);
+    case Phase::known_ahead:
+    case Phase::known_back:
+      return follow_known();
     case Phase::grow:
       return grow();
     case Phase::connect:
@@ -113,6 +118,9 @@ void Search::Run::take_answer(bool clear) {
   switch (phase_) {
     case Phase::straight:
       return take_straight(clear);
+    case Phase::known_ahead:
+    case Phase::known_back:
+      return take_known(clear);
     case Phase::grow:
       if (!clear) return;
       node_ = (grows_start_ ? from_start_ : from_goal_).add(sample_, near_);
@@ -132,9 +140,15 @@ void Search::Run::take_answer(bool clear) {
 }
 
 void Search::Run::find_first_root() {
-  if (!finder_.tries(0)) return end("no clear configuration was found at the goal");
   Root root;
-  if (!finder_.attempt(*query_, rng_, root)) return;
+  if (tries_known_) {
+    tries_known_ = false;
+    knows_ = finder_.take(problem_.known.rightCols<1>(), *query_, root);
+  }
+  if (!knows_) {
+    if (!finder_.tries(0)) return end("no clear configuration was found at the goal");
+    if (!finder_.attempt(*query_, rng_, root)) return;
+  }
   add_root(root);
   set_margins();
   from_start_.add(problem_.start, -1);
@@ -169,9 +183,49 @@ void Search::Run::take_straight(bool clear) {
     return found_first(points);
   }
   from_goal_.add(root.q, -1);
-  if (tried_ < roots_.size()) return;
+  if (tried_ == roots_.size()) begin_growing();
+}
+
+void Search::Run::begin_growing() {
   next_root_ = used() + root_checks;
   phase_ = Phase::grow;
+  if (!knows_ || follows_known_) return;
+  follows_known_ = true;
+  known_from_ = 0;
+  known_to_ = problem_.known.cols() - 1;
+  known_start_ = known_goal_ = 0;
+  phase_ = Phase::known_ahead;
+}
+
+// The next piece of the known path, from the start until one is not clear, then from its end.
+void Search::Run::follow_known() {
+  const bool ahead = phase_ == Phase::known_ahead;
+  at_ = ahead ? from_start_.q(known_start_) : from_goal_.q(known_goal_);
+  if (ahead)
+    sample_ = problem_.known.col(known_from_);
+  else if (known_to_ > known_from_)
+    sample_ = problem_.known.col(known_to_ - 1);
+  else
+    sample_ = from_start_.q(known_start_);
+  const double distance = weighted_distance(weights_, at_, sample_);
+  known_ends_ = distance <= range;
+  if (!known_ends_) sample_ = at_ + range / distance * (sample_ - at_);
+  ask(at_, sample_);
+}
+
+void Search::Run::take_known(bool clear) {
+  const bool ahead = phase_ == Phase::known_ahead;
+  if (!clear) {
+    phase_ = ahead ? Phase::known_back : Phase::grow;
+  } else if (known_ends_ && known_from_ == known_to_) {
+    join(known_start_, known_goal_);
+  } else if (ahead) {
+    known_start_ = from_start_.add(sample_, known_start_);
+    known_from_ += known_ends_ ? 1 : 0;
+  } else {
+    known_goal_ = from_goal_.add(sample_, known_goal_);
+    known_to_ -= known_ends_ ? 1 : 0;
+  }
 }
 
 // Until a root was found, or a batch is at its end.
@@ -188,16 +242,24 @@ void Search::Run::find_more_roots() {
 }
 
 void Search::Run::draw() {
-  if (rng_.uniform() >= near_share) {
+  if (rng_.uniform() >= (knows_ ? near_known_share : near_share)) {
     for (Index j = 0; j < sample_.size(); ++j)
       sample_[j] = rng_.uniform(bounds_.lower[j], bounds_.upper[j]);
     return;
   }
-  const auto k = static_cast<std::size_t>(rng_.below(roots_.size() + 1));
-  const VectorXd& center = k < roots_.size() ? roots_[k].q : problem_.start;
+  set_center();
   for (Index j = 0; j < sample_.size(); ++j)
-    sample_[j] = std::clamp(center[j] + near_spread / weights_[j] * rng_.normal(), bounds_.lower[j],
+    sample_[j] = std::clamp(at_[j] + near_spread / weights_[j] * rng_.normal(), bounds_.lower[j],
                             bounds_.upper[j]);
+}
+
+// Start or root, or an end of what is clear of the known path.
+void Search::Run::set_center() {
+  const auto k = static_cast<std::size_t>(rng_.below(knows_ ? 2 : roots_.size() + 1));
+  if (knows_)
+    at_ = k == 0 ? from_start_.q(known_start_) : from_goal_.q(known_goal_);
+  else
+    at_ = k < roots_.size() ? roots_[k].q : problem_.start;
 }
 
 // The smaller tree grows towards a sample.
@@ -278,6 +340,7 @@ void Search::Run::next_margins() {
     return end(fmt::format("no path was found within {} checks", settings_.checks_max));
   set_margins();
   from_start_.add(problem_.start, -1);
+  follows_known_ = false;
   tried_ = 0;
   phase_ = Phase::straight;
 }

@@ -23,7 +23,18 @@ class Search::Run {
   [[nodiscard]] const Path& path() const noexcept { return path_; }
 
  private:
-  enum class Phase { first_root, more_roots, straight, grow, connect, shorten, improve, ended };
+  enum class Phase {
+    first_root,
+    more_roots,
+    straight,
+    known_ahead,
+    known_back,
+    grow,
+    connect,
+    shorten,
+    improve,
+    ended
+  };
   void step();
   void take_answer(bool clear);
   void ask(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
@@ -33,12 +44,16 @@ class Search::Run {
   void add_root(const Root& root);
   void set_margins();
   void take_straight(bool clear);
+  void begin_growing();
+  void follow_known();
+  void take_known(bool clear);
   void find_more_roots();
   void grow();
   void connect();
   void take_connected(bool clear);
   void shorten();
   void draw();
+  void set_center();
   void join(int in_start, int in_goal);
   void found_first(const Eigen::MatrixXd& points);
   void improve();
@@ -62,6 +77,12 @@ class Search::Run {
   std::size_t attempt_ = 0;  ///< of the margins
   std::vector<Root> roots_;
   std::size_t tried_ = 0;  ///< roots to which the straight line was tried
+  bool tries_known_ = false, follows_known_ = false;  ///< as the first root; its lines
+  bool knows_ = false;  ///< the end of the known path is the first root
+  /// The way-points [from, to) of the known path are not in a tree yet; nodes beside them.
+  Eigen::Index known_from_ = 0, known_to_ = 0;
+  int known_start_ = 0, known_goal_ = 0;
+  bool known_ends_ = false;  ///< the piece that is asked ends at a way-point
   long next_root_ = 0, improve_until_ = 0;
   std::optional<Margins> margins_;
   bool grows_start_ = true;

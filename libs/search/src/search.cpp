@@ -45,6 +45,11 @@ void check(const model::Model& model, const Problem& problem) {
   fits(problem.start, "start");
   if (problem.goals.empty())
     throw Error(ErrorCode::invalid, "search: goals: none given, expected at least one");
+  if (problem.known.size() != 0 &&
+      (problem.known.rows() != model.dof() || !problem.known.allFinite()))
+    throw Error(ErrorCode::invalid,
+                fmt::format("search: known path: {} rows given, expected {} of finite numbers",
+                            problem.known.rows(), model.dof()));
   for (const scene::Goal& goal : problem.goals) {
     check(goal);
     if (goal.type == scene::GoalType::joint) fits(goal.q, "goal");

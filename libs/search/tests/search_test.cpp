@@ -143,6 +143,45 @@ TEST_CASE("with several goals the path leads to one of them", "[search]") {
   CHECK(path.points.rightCols(1) == rig.problem.goals[1].q);
 }
 
+TEST_CASE("a search begins with what is clear of a path that was known", "[search]") {
+  SearchRig rig;
+  test::JointSpaceWorld free({}), blocked(SearchRig::ball());
+  rig.problem.known.resize(3, 4);
+  // around the ball, from beside the start
+  rig.problem.known << -0.9, 1.2, 1.2, 1.0,  //
+      -1.0, -1.0, 1.0, 1.0,                  //
+      -1.0, -1.0, -0.9, 1.0;
+  const search::Path kept = search::Search(rig.arm, rig.settings).search(rig.problem, blocked);
+  REQUIRE(kept.found());
+  CHECK(kept.planned.col(0) == rig.problem.start);
+  CHECK(kept.planned.cols() > 4);  // in pieces of 0.5
+  const VectorXd behind = rig.problem.known.col(2);
+  CHECK((kept.planned.colwise() - behind).colwise().norm().minCoeff() < 1e-12);
+  // a second ball on the second line of it
+  auto balls = SearchRig::ball();
+  balls.push_back({Eigen::Vector3d(1.2, 0.0, -0.95), 0.3});
+  test::JointSpaceWorld world(balls), again(balls);
+  const search::Path around = search::Search(rig.arm, rig.settings).search(rig.problem, world);
+  REQUIRE(around.found());
+  CHECK(sampled_distance(world, around.points) > 0.05 - 1e-9);
+  const Eigen::Vector3d before(0.9, -1.0, -1.0);  // on the first line
+  double nearest = 1.0;
+  for (Index i = 0; i + 1 < around.planned.cols(); ++i)
+    for (int k = 0; k <= 100; ++k)
+      nearest = std::min(nearest,
+                         (around.planned.col(i) +
+                          0.01 * k * (around.planned.col(i + 1) - around.planned.col(i)) - before)
+                             .norm());
+  CHECK(nearest < 0.1);
+  // a path that leads elsewhere has no effect
+  rig.problem.known.col(3).setConstant(-1.5);
+  const search::Path other = search::Search(rig.arm, rig.settings).search(rig.problem, again);
+  rig.problem.known.resize(0, 0);
+  test::JointSpaceWorld third(balls);
+  CHECK(same(other.planned,
+             search::Search(rig.arm, rig.settings).search(rig.problem, third).planned));
+}
+
 TEST_CASE("a search depends on seed, number and problem alone", "[search][threads]") {
   const auto search = [&](std::uint64_t seed, std::uint64_t number) {
     SearchRig own;
@@ -260,6 +299,10 @@ TEST_CASE("bad settings and problems are refused in one line", "[search]") {
   CHECK(error() == "search: goal: follows a target, expected a goal that stays where it is");
   rig.problem.goals[0] = scene::position_goal({std::nan(""), 0.0, 0.0});
   CHECK(error() == "search: goal: is not finite, expected finite numbers");
+  rig.problem.goals[0] = scene::joint_goal(VectorXd::Zero(3));
+  rig.problem.known = MatrixXd::Zero(2, 3);
+  CHECK(error() == "search: known path: 2 rows given, expected 3 of finite numbers");
+  rig.problem.known = {};
   rig.settings.q_lower = VectorXd::Zero(1);
   CHECK(error() == "search: 1 joint limits given, expected 3");
   rig.settings.q_lower = {};

@@ -67,7 +67,11 @@ void GuideSearch::answer() {
   out->checks = query_.checks() - before;
   try {
     if (!out->kept) {
-      out->path = search_.search({request_.q, {request_.goal}, request_.search}, query_);
+      out->path = search_.search({request_.q,
+                                  {request_.goal},
+                                  request_.search,
+                                  request_.kept.leftCols(request_.kept_count)},
+                                 query_);
       out->checks += out->path.checks;
     }
   } catch (const std::exception& e) {  // on a thread of its own nobody could catch it

@@ -33,6 +33,10 @@ struct Problem {
   /// Joint, position or pose goals, at least one: the path leads to any of them.
   std::vector<scene::Goal> goals;
   std::uint64_t number = 0;  ///< of the search: distinguishes the random numbers
+  /// dof × way-points of a path from near the start, which led to one of the goals before the world
+  /// changed; what is still clear of it is where the search begins. May be empty, and is ignored if
+  /// its end is no longer a goal.
+  Eigen::MatrixXd known{};
 };
 
 /// What a search found.
