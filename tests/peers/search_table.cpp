@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "exact_query.hpp"
 #include "guide/guide_query.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
@@ -15,12 +16,13 @@
 #include "hamelin/core/rng.hpp"
 #include "ompl_search.hpp"
 
-// hamelin_search_peers [--seeds N] [--improve N] [--changes N] [--list] [--peers A,B] SCENE...:
-// searches a path to the first goal of each scene by libs/search, and by OMPL's planners on the
-// same proofs of motions; `--peers none`: by ours only. Prints how many were found, CPU times until
-// the first path and with shortening, checks and lengths. OMPL is given the configuration at which
-// our path ends, and so needs no inverse kinematics. With --changes, boxes appear on the paths and
-// disappear, as often for each scene and seed; the table shows the searches of new paths.
+// hamelin_search_peers [--isa NAME] [--seeds N] [--improve N] [--changes N] [--list] [--peers A,B]
+// [--exact] SCENE...: searches a path to the first goal of each scene by libs/search, and by OMPL's
+// planners on the same proofs of motions, or with --exact on proofs by exact distances alone;
+// `--peers none`: by ours only. Prints how many were found, CPU times until the first path and with
+// shortening, checks and lengths. OMPL is given the configuration at which our path ends, and so
+// needs no inverse kinematics. With --changes, boxes appear on the paths and disappear, as often
+// for each scene and seed; the table shows the searches of new paths.
 namespace {
 
 using namespace hamelin;
@@ -86,7 +88,7 @@ void print(const std::string& name, const Figures& f) {
 struct Options {
   int seeds = 1, changes = 0;
   long improve = 0;
-  bool list = false;
+  bool list = false, exact = false;
   std::string peers;
 };
 
@@ -155,24 +157,24 @@ search::Path search_ours(Rig& rig, int seed, const Options& options, Figures& fi
   return path;
 }
 
-void search_theirs(Rig& rig, const std::string& planner, int seed, const search::Path& ours,
-                   Figures& figures) {
+void search_theirs(Rig& rig, search::Query& query, const std::string& planner, int seed,
+                   const search::Path& ours, Figures& figures) {
   search::Margins margins(ours.margin_m);
   const VectorXd start = rig.scene.start_q, goal = ours.points.rightCols(1);
   for (const VectorXd& q : {start, goal})
-    margins.add(q, std::max(0.5e-3, rig.query.clearance(q, -1.0) - rig.settings.slack_m), 0.2, 0.9);
-  rig.query.set_margins(margins);
+    margins.add(q, std::max(0.5e-3, query.clearance(q, -1.0) - rig.settings.slack_m), 0.2, 0.9);
+  query.set_margins(margins);
   const auto search = [&](bool simplifies) {
-    return peers::ompl_search({planner, rig.box, start, goal, rig.query,
+    return peers::ompl_search({planner, rig.box, start, goal, query,
                                static_cast<std::uint64_t>(seed), rig.settings.checks_max},
                               simplifies);
   };
-  const long before = rig.query.checks();
+  const long before = query.checks();
   const double since = cpu_s();
   const MatrixXd first = search(false);
   const double first_s = cpu_s() - since;
   const MatrixXd path = search(true);
-  figures.add(path.cols() > 0, first_s, cpu_s() - since - first_s, rig.query.checks() - before,
+  figures.add(path.cols() > 0, first_s, cpu_s() - since - first_s, query.checks() - before,
               search::path_length(path));
 }
 
@@ -217,7 +219,11 @@ Options read(int argc, char** argv, std::vector<std::unique_ptr<Rig>>& rigs) {
   Options out;
   for (int i = 1; i < argc; ++i) {
     const std::string arg = argv[i];
-    if (arg == "--seeds" && i + 1 < argc)
+    if (arg == "--isa" && i + 1 < argc)  // before the scenes
+      set_default_isa(isa_from_name(argv[++i], "--isa"));
+    else if (arg == "--exact")
+      out.exact = true;
+    else if (arg == "--seeds" && i + 1 < argc)
       out.seeds = std::atoi(argv[++i]);
     else if (arg == "--improve" && i + 1 < argc)
       out.improve = std::atol(argv[++i]);
@@ -269,7 +275,10 @@ int run(int argc, char** argv) {
       continue;
     Figures theirs;
     for_paths([&](Rig& rig, int seed, const search::Path& path) {
-      search_theirs(rig, planner, seed, path, theirs);
+      if (!options.exact) return search_theirs(rig, rig.query, planner, seed, path, theirs);
+      peers::ExactQuery exact(rig.query, rig.arm, rig.view.self_field(),
+                              rig.world.latest()->environment);
+      search_theirs(rig, exact, planner, seed, path, theirs);
     });
     print(planner, theirs);
   }

@@ -109,8 +109,8 @@ double Law::attract(const model::Model& model, const dynamics::Workspace& ws,
   G.diagonal().array() += relative_damping * scale;
   const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(G);
   u.noalias() = J_.transpose() * factor.solve(desired).eval();
-  const double speed = u.norm(), limit = 1.5 * params_.cruise_speed;
-  if (speed > limit) u *= limit / speed;
+  const double fastest = u.lpNorm<Eigen::Infinity>();
+  if (fastest > params_.cruise_speed) u *= params_.cruise_speed / fastest;
   if (middle_.size() == 0) return rate;
   centring_ = centring_gain * (middle_ - q);
   // Centring must not push the tip off its goal, so this projection is almost undamped.

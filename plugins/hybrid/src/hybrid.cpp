@@ -13,8 +13,8 @@
 #include "evader.hpp"
 #include "follower.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/planning/joint_path.hpp"
 #include "hamelin/planning/plugin.hpp"
-#include "joint_path.hpp"
 #include "params_schema.hpp"
 #include "parts.hpp"
 #include "stall.hpp"
@@ -500,7 +500,7 @@ class Hybrid final : public planning::Planner {
          tracking_gain_ = 0.0, drive_acceleration_ = 0.0, acceleration_max_ = 0.0, brake_ = 0.0,
          rate_ = 0.0, joint_damping_ = 0.0, contact_radius_;
   bool asks_, searches_ = false;  ///< for paths; and may still do so at this goal
-  JointPath path_;
+  planning::JointPath path_;
   VectorXd u_, via_, lower_, upper_;
   const hamelin_goal* goal_ = nullptr;  ///< of goal_number_
   std::uint64_t goal_number_ = 0;

@@ -3,7 +3,7 @@
 
 #include "evasion.hpp"
 #include "hamelin/core/rng.hpp"
-#include "joint_path.hpp"
+#include "hamelin/planning/joint_path.hpp"
 #include "parts.hpp"
 
 namespace hamelin::hybrid {
@@ -12,9 +12,10 @@ namespace hamelin::hybrid {
 struct Course {
   const hamelin_goal* goal = nullptr;
   const Eigen::VectorXd* via = nullptr;  ///< replaces the goal, or null
-  const JointPath* path = nullptr;       ///< leads to the goal or the end of an escape, or null
-  double position = 0.0;                 ///< arc length on the path
-  double ahead = 0.0;                    ///< distance of the carrot on the path
+  const planning::JointPath* path =
+      nullptr;            ///< leads to the goal or the end of an escape, or null
+  double position = 0.0;  ///< arc length on the path
+  double ahead = 0.0;     ///< distance of the carrot on the path
   bool waits = false;
   std::uint64_t goal_number = 0;  ///< as hamelin_tick.goal_number
 

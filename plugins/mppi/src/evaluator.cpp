@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "cost_to_go.hpp"
+
 namespace hamelin::mppi {
 
 namespace {
@@ -135,7 +137,7 @@ void Evaluator::add_torques(const Task& task, Rollouts& rollouts) {
 
 double Evaluator::time_to_go(const Task& task, const Eigen::VectorXd& q) {
   if (!task.tip_cost)
-    return task.path.cost_to_go(q, task.path_from, task.path_to).cost / task.cruise_speed;
+    return cost_to_go(task.path, q, task.path_from, task.path_to).cost / task.cruise_speed;
   dynamics::forward_kinematics(model_, ws_, q);
   const geometry::SE3 tip = dynamics::tip_pose(model_, ws_);
   const double error = (task.goal.position - tip.p()).norm() / tip_speed;

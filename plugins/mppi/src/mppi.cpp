@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cost_to_go.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "params_schema.hpp"
@@ -326,7 +327,7 @@ class Mppi final : public planning::Planner {
   void measure_start() {
     task_.start_clearance_m = pool_.evaluator().query().clearance(span_of(planned_.q), spacing_s_);
     task_.margins.set_start(planned_.q, task_.start_clearance_m);
-    const auto place = task_.path.cost_to_go(planned_.q, task_.path_from, task_.path_from + reach);
+    const auto place = cost_to_go(task_.path, planned_.q, task_.path_from, task_.path_from + reach);
     left_ = place.cost;
     task_.path_from = place.s;
     task_.path_to = place.s + reach;

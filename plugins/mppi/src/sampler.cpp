@@ -25,7 +25,6 @@ struct Following {
 constexpr std::array<Following, 5> following_ways{
     {{1.0, 0.3}, {1.0, 0.1}, {0.6, 0.1}, {0.3, 0.05}, {0.12, 0.03}}};
 constexpr Following slowest{0.2, 0.02}, fastest{1.0, 0.4};
-constexpr double path_step = 0.02;  // of the search for the carrot [rad or m]
 
 // Numbers of different plans and samples are independent: the seed of a generator is a mix of all.
 std::uint64_t mix(std::uint64_t a, std::uint64_t b) {
@@ -138,11 +137,7 @@ void Sampler::follow(const Task& task, double speed_share, double ahead) {
   double s = task.path_from;
   for (Index i = 3; i < n; ++i) {
     const auto position = points_.col(i - 1);
-    task.path.at(s, carrot_);
-    while (s < task.path.length() && (carrot_ - position).norm() < ahead) {
-      s = std::min(s + path_step, task.path.length());
-      task.path.at(s, carrot_);
-    }
+    s = task.path.carrot(s, position, ahead, carrot_);
     step_ = carrot_ - position;
     const double distance = step_.norm();
     double length = distance, brake = limits.change.maxCoeff();
@@ -162,14 +157,16 @@ void Sampler::follow(const Task& task, double speed_share, double ahead) {
   }
 }
 
-double Sampler::length_before_turns(const JointPath& path, double s, double distance, double ahead,
-                                    double brake) {
+double Sampler::length_before_turns(const planning::JointPath& path, double s, double distance,
+                                    double ahead, double brake) {
   const double left = path.length() - s + distance;
   double length = braking_step<Scalar>(Scalar(left), brake)[0];
   for (Index k = 1; k + 1 < path.size(); ++k) {
     const double before = path.arc(k) - s + distance;
-    if (before < 0.0 || path.turn(k) == 0.0) continue;
-    const double turning = brake * ahead / path.turn(k);
+    if (before < 0.0) continue;
+    const double turn = path.turn(k);
+    if (turn == 0.0) continue;
+    const double turning = brake * ahead / turn;
     length = std::min(length, std::sqrt(turning + 2.0 * brake * std::max(0.0, before - ahead)));
   }
   return length;

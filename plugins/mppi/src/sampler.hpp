@@ -32,8 +32,8 @@ class Sampler {
 
  private:
   /// The longest step from which the arm can still slow down for the turns and the end of the path.
-  [[nodiscard]] static double length_before_turns(const JointPath& path, double s, double distance,
-                                                  double ahead, double brake);
+  [[nodiscard]] static double length_before_turns(const planning::JointPath& path, double s,
+                                                  double distance, double ahead, double brake);
   void follow(const Task& task, double speed_share, double ahead);
 
   Eigen::Matrix<double, Eigen::Dynamic, coefficient_count> basis_;

@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "hamelin/dynamics/inverse_kinematics.hpp"
+#include "hamelin/planning/joint_path.hpp"
 #include "hamelin/planning/plugin.hpp"
-#include "joint_path.hpp"
 #include "margins.hpp"
 #include "step_limits.hpp"
 
@@ -49,7 +49,7 @@ struct Task {
   Eigen::MatrixXd mean, best;  ///< control points: the mean, and the best rollout before
   Goal goal;
   bool tip_cost = false;  ///< whether the error of the tip counts, instead of the path
-  JointPath path;
+  planning::JointPath path;
   double path_from = 0.0, path_to = 0.0;  ///< arc lengths between which rollouts join the path
   Margins margins;
   double start_clearance_m = 0.0;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "../src/joint_path.hpp"
+#include "../src/cost_to_go.hpp"
 #include "../src/margins.hpp"
 #include "../src/sampler.hpp"
 #include "../src/spline.hpp"
@@ -172,7 +172,7 @@ TEST_CASE("following reaches the end of the path exactly", "[mppi]") {
 }
 
 TEST_CASE("the cost to go is the least over all places of the path", "[mppi]") {
-  JointPath path(2, 8);
+  planning::JointPath path(2, 8);
   path.add(Vector2d(0.0, 0.0));
   path.add(Vector2d(1.0, 0.0));
   path.add(Vector2d(1.0, 2.0));
@@ -190,7 +190,7 @@ TEST_CASE("the cost to go is the least over all places of the path", "[mppi]") {
       path.at(s, p);
       least = std::min(least, 3.0 - s + 3.0 * (q - p).norm());
     }
-    const auto place = path.cost_to_go(q, from, to);
+    const auto place = cost_to_go(path, q, from, to);
     CHECK(place.cost == Approx(least).margin(2e-4));
     CHECK(place.s >= from - 1e-12);
     CHECK(place.s <= to + 1e-12);
@@ -231,10 +231,10 @@ TEST_CASE("the path of the tip is that of the knots", "[mppi]") {
 }
 
 TEST_CASE("a path without length costs the distance from it", "[mppi]") {
-  JointPath path(2, 4);
+  planning::JointPath path(2, 4);
   path.add(Vector2d(1.0, 0.0));
   path.add(Vector2d(1.0, 0.0));
-  CHECK(path.cost_to_go(Vector2d(1.0, 2.0), 0.0, 2.0).cost == Approx(2.0));
+  CHECK(cost_to_go(path, Vector2d(1.0, 2.0), 0.0, 2.0).cost == Approx(2.0));
 }
 
 TEST_CASE("workers do each unit once and wait for all", "[mppi][threads]") {

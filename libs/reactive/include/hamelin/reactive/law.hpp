@@ -30,7 +30,7 @@ struct TipError {
 
 struct LawParams {
   double joint_gain = 4.0, tip_gain = 3.0;  ///< near a target of the joints and of the tip [1/s]
-  double cruise_speed = 2.0;                ///< of the fastest joint, towards joint goals [rad/s or m/s]
+  double cruise_speed = 2.0;                ///< of the fastest joint [rad/s or m/s]
   double tip_speed = 0.5, tip_turn = 1.5;   ///< towards a goal of the tip [m/s], [rad/s]
   double repulsion_range = 0.0;             ///< from the margins [m]; 0: none
   double repulsion_speed = 0.0;             ///< at the margins [m/s]

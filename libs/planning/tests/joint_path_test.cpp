@@ -1,4 +1,4 @@
-#include "../src/joint_path.hpp"
+#include "hamelin/planning/joint_path.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -8,7 +8,7 @@
 using Eigen::Vector2d;
 using Eigen::VectorXd;
 using hamelin::Rng;
-using hamelin::hybrid::JointPath;
+using hamelin::planning::JointPath;
 
 namespace {
 
@@ -30,7 +30,7 @@ VectorXd at(const JointPath& path, double s) {
 
 }  // namespace
 
-TEST_CASE("a path is parametrised by its arc length", "[hybrid][joint_path]") {
+TEST_CASE("a path is parametrised by its arc length", "[planning][joint_path]") {
   const JointPath path = hook();
   CHECK(path.length() == 6.0);
   CHECK(at(path, -1.0) == Vector2d(0.0, 0.0));
@@ -44,7 +44,7 @@ TEST_CASE("a path is parametrised by its arc length", "[hybrid][joint_path]") {
   CHECK(path.end() == Vector2d(-2.0, 2.0));
 }
 
-TEST_CASE("repeated points in a path are harmless", "[hybrid][joint_path]") {
+TEST_CASE("repeated points in a path are harmless", "[planning][joint_path]") {
   JointPath path(2, 8);
   path.add(Vector2d(0.0, 0.0));
   path.add(Vector2d(0.0, 0.0));
@@ -56,7 +56,7 @@ TEST_CASE("repeated points in a path are harmless", "[hybrid][joint_path]") {
   CHECK(at(path, 1.0) == Vector2d(1.0, 0.0));
 }
 
-TEST_CASE("a path accepts no more points than its capacity", "[hybrid][joint_path]") {
+TEST_CASE("a path accepts no more points than its capacity", "[planning][joint_path]") {
   JointPath path = hook(4);
   path.add(Vector2d(9.0, 9.0));
   CHECK(path.size() == 4);
@@ -64,7 +64,7 @@ TEST_CASE("a path accepts no more points than its capacity", "[hybrid][joint_pat
   CHECK(path.end() == Vector2d(-2.0, 2.0));
 }
 
-TEST_CASE("the carrot moves ahead on the path and never back", "[hybrid][joint_path]") {
+TEST_CASE("the carrot moves ahead on the path and never back", "[planning][joint_path]") {
   const JointPath path = hook();
   VectorXd q(2), carrot(2);
   q << 0.0, 0.0;
