@@ -49,7 +49,8 @@ class EdgeCheck {
     begin_motion(a, b, margin_m, subjects);
     return *prove(std::numeric_limits<long>::max());
   }
-  /// Begins such a proof, in place of any that was begun before. @param subjects must stay
+  /// Begins such a proof, in place of any that was begun before; any other call but prove() and
+  /// checks() ends it without an answer. @param subjects must stay
   void begin_motion(const Eigen::VectorXd& a, const Eigen::VectorXd& b, double margin_m,
                     std::span<const int> subjects);
   void begin_motion(const Eigen::VectorXd& a, const Eigen::VectorXd& b, double margin_m) {
