@@ -150,7 +150,6 @@ void Search::Run::find_first_root() {
     if (!finder_.attempt(*query_, rng_, root)) return;
   }
   add_root(root);
-  set_margins();
   from_start_.add(problem_.start, -1);
   phase_ = Phase::straight;
 }
@@ -159,6 +158,7 @@ void Search::Run::add_root(const Root& root) {
   roots_.push_back(root);
   bounds_.lower = bounds_.lower.cwiseMin(root.q);
   bounds_.upper = bounds_.upper.cwiseMax(root.q);
+  set_margins();
 }
 
 void Search::Run::set_margins() {
@@ -233,7 +233,6 @@ void Search::Run::find_more_roots() {
   Root root;
   if (finder_.attempt(*query_, rng_, root)) {
     add_root(root);
-    set_margins();
     phase_ = Phase::straight;
   } else if (!finder_.in_batch()) {
     next_root_ = used() + root_checks;

@@ -12,8 +12,8 @@ namespace hamelin::hybrid {
 struct Course {
   const hamelin_goal* goal = nullptr;
   const Eigen::VectorXd* via = nullptr;  ///< replaces the goal, or null
-  const planning::JointPath* path =
-      nullptr;            ///< leads to the goal or the end of an escape, or null
+  /// Leads to the goal or the end of an escape, or null.
+  const planning::JointPath* path = nullptr;
   double position = 0.0;  ///< arc length on the path
   double ahead = 0.0;     ///< distance of the carrot on the path
   bool waits = false;
