@@ -41,11 +41,12 @@ EdgeCheck::EdgeCheck(const model::Model& model, const scene::SelfField* self)
   pair_way_ = VectorXd::Zero(levers_.pairs().rows());
 }
 
-void EdgeCheck::set_environment(const scene::Environment& environment, double time_s) {
+void EdgeCheck::set_environment(const scene::Environment& environment, double time_s,
+                                bool movers) {
   environment_ = &environment;
   time_s_ = time_s;
   obstacles_ = environment.has_obstacles();
-  movers_ = environment.has_movers();
+  movers_ = movers && environment.has_movers();
   std::fill(hints_.begin(), hints_.end(), -1);
 }
 

@@ -65,10 +65,10 @@ class LineCheck::Impl {
     scratch_->context = this;
   }
 
-  void set_environment(const scene::Environment& environment, double time_s) {
-    edge_.set_environment(environment, time_s);
+  void set_environment(const scene::Environment& environment, double time_s, bool movers) {
+    edge_.set_environment(environment, time_s, movers);
     for (kernel::Hot& hot : scratch_->hot) hot = {-1, -1};
-    in_lanes_ = world_.set(environment, time_s);
+    in_lanes_ = world_.set(environment, time_s, movers);
   }
 
   void set_margins(const Margins& margins) {
@@ -268,8 +268,9 @@ LineCheck::LineCheck(LineCheck&&) noexcept = default;
 LineCheck& LineCheck::operator=(LineCheck&&) noexcept = default;
 LineCheck::~LineCheck() = default;
 
-void LineCheck::set_environment(const scene::Environment& environment, double time_s) {
-  impl_->set_environment(environment, time_s);
+void LineCheck::set_environment(const scene::Environment& environment, double time_s,
+                                bool movers) {
+  impl_->set_environment(environment, time_s, movers);
 }
 void LineCheck::set_margins(const Margins& margins) {
   impl_->set_margins(margins);

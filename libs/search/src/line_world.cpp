@@ -57,11 +57,11 @@ LineWorld::LineWorld(const model::Model& model, LineArm& arm)
   primitives_.reserve(kernel::primitives_max);
 }
 
-bool LineWorld::set(const scene::Environment& environment, double time_s) {
+bool LineWorld::set(const scene::Environment& environment, double time_s, bool movers) {
   environment_ = &environment;
   field_ = environment.distance_field();
   std::fill(hints_.begin(), hints_.end(), Hint{-1, -1});
-  return arm_.fits() && field_ != nullptr && place_frame() && add_primitives(time_s);
+  return arm_.fits() && field_ != nullptr && place_frame() && add_primitives(time_s, movers);
 }
 
 bool LineWorld::place_frame() {
@@ -104,11 +104,14 @@ bool LineWorld::place_frame() {
   return most < exact_float;
 }
 
-bool LineWorld::add_primitives(double time_s) {
+bool LineWorld::add_primitives(double time_s, bool movers) {
   primitives_.clear();
   const geometry::SE3 inverse = frame_.inverse();
-  for (const scene::Obstacle& obstacle : environment_->obstacles()) {
-    if (!scene::exists(obstacle, time_s) || obstacle.shape == scene::Shape::frame) continue;
+  for (std::size_t k = 0; k < environment_->obstacles().size(); ++k) {
+    const scene::Obstacle& obstacle = environment_->obstacles()[k];
+    if (!scene::exists(obstacle, time_s) || obstacle.shape == scene::Shape::frame ||
+        (!movers && environment_->moves(k)))
+      continue;
     if (primitives_.size() == kernel::primitives_max) return false;
     const scene::Placed placed = scene::placed_at(obstacle, time_s);
     primitives_.push_back(primitive_of(obstacle, inverse * placed.pose, placed.nearer_m,

@@ -20,7 +20,7 @@ class LineWorld {
   LineWorld(const model::Model& model, LineArm& arm);
 
   /// @param environment must stay until the next call @return whether the kernels have room for it
-  [[nodiscard]] bool set(const scene::Environment& environment, double time_s);
+  [[nodiscard]] bool set(const scene::Environment& environment, double time_s, bool movers);
   [[nodiscard]] const kernel::World& view() const noexcept { return world_; }
   /// A point's distance from the map, or `limit` if that is less [m].
   [[nodiscard]] double distance(int sphere, const float* p, double limit);
@@ -30,7 +30,7 @@ class LineWorld {
     std::int32_t map, unknown;
   };
   [[nodiscard]] bool place_frame();
-  [[nodiscard]] bool add_primitives(double time_s);
+  [[nodiscard]] bool add_primitives(double time_s, bool movers);
 
   const model::Model& model_;
   LineArm& arm_;

@@ -18,6 +18,21 @@ double Margins::margin_at(const Place& place, double distance) const {
   return place.margin + weight * (full_ - place.margin);
 }
 
+Margins Margins::raised(double by_m) const {
+  Margins out = *this;
+  out.full_ += by_m;
+  out.self_most_ += by_m;
+  for (Place& place : out.places_) place.margin += by_m;
+  return out;
+}
+
+double Margins::slope() const {
+  double most = 0.0;
+  for (const Place& place : places_)
+    most = std::max(most, (full_ - place.margin) / (place.far - place.near));
+  return most;
+}
+
 // docs/theory.md (17.1)
 double Margins::required(const VectorXd& q) const {
   double margin = full_;

@@ -21,6 +21,7 @@ class Search::Run {
   void begin(const Problem& problem, Query& query);
   bool advance(long checks);
   [[nodiscard]] const Path& path() const noexcept { return path_; }
+  [[nodiscard]] const Margins& margins() const noexcept { return *margins_; }
 
  private:
   enum class Phase {

@@ -86,6 +86,10 @@ const Path& Search::path() const noexcept {
   return run_->path();
 }
 
+const Margins& Search::margins() const noexcept {
+  return run_->margins();
+}
+
 Path Search::search(const Problem& problem, Query& query) {
   begin(problem, query);
   while (!advance(settings_.checks_max)) {

@@ -144,7 +144,7 @@ void ClosedLoop::feed_target() {
 
 void ClosedLoop::note_reference() {
   const control::ReferenceState* const reference = controller_->answer().reference;
-  if (reference != nullptr)
+  if (reference != nullptr && controller_->goals().goal().trajectory)
     trajectory_.observe(controller_->goals().goal(), *reference, plant_->node().q,
                         controller_->period_s());
 }

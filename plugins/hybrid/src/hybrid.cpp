@@ -124,6 +124,7 @@ class Hybrid final : public planning::Planner {
     const Target target = choose_target();
     evader_.update(tick, arm(), course());
     tracks_ = tracks(tick);
+    certified_ = tracks_ && tick.reference()->certified;
     if (tracks_)
       margins_.set_least(drive_.points());
     else
@@ -254,7 +255,8 @@ class Hybrid final : public planning::Planner {
   // Whether the arm is near the reference of a trajectory; away from it, the trajectory is a path.
   [[nodiscard]] bool tracks(const planning::Tick& tick) const {
     const auto reference = tick.reference();
-    return reference && reference->rate > track_rate_least && mode_ == Mode::goal &&
+    return reference && (reference->certified || reference->rate > track_rate_least) &&
+           mode_ == Mode::goal &&
            !evader_.evades() &&
            (reference->q - drive_.q()).lpNorm<Eigen::Infinity>() < track_within;
   }
@@ -319,7 +321,7 @@ class Hybrid final : public planning::Planner {
 
   void drive(planning::Command& command) {
     drive_.begin_filter(pace(), [this](const NearPoint& point) {
-      if (!evader_.moves(point.obstacle)) return 0.0;
+      if (!evader_.moves(point.obstacle)) return certified_ ? -1.0 : 0.0;
       return evader_.has_rows() ? MoverRows::softness : -1.0;
     });
     if (evader_.active() && evader_.has_rows())
@@ -506,6 +508,7 @@ class Hybrid final : public planning::Planner {
   std::uint64_t goal_number_ = 0;
   Mode mode_ = Mode::goal;
   bool tracks_ = false;          ///< the reference of a trajectory
+  bool certified_ = false;       ///< of a path that is proved to be clear
   bool measure_margins_ = true;  ///< whether goal or margins have changed
   double path_position_ = 0.0;
 };

@@ -99,8 +99,8 @@ void Guidance::ask(const Now& now, GuideSearch& search) {
 }
 
 Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
-  const GuideAnswer& answer = search.take();
-  if (answer.number != asked_) return News::none;
+  GuideAnswer& answer = search.take();
+  if (answer.number != asked_ || (before_ && before_.get() == now.in_force)) return News::none;
   // docs/theory.md (17.5)
   if (now.time_s < asked_s_ + check_time_s_ * static_cast<double>(answer.checks)) return News::none;
   awaits_ = false;
@@ -115,6 +115,8 @@ Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
     ++figures_.found;
     figures_.length = answer.path.length;
     margin_m_ = answer.path.margin_m;
+    before_.swap(answer.motion);  // the memory of the one before goes back with the answer
+    before_.swap(motion_);
     set_path(now, answer.path.points);
     return News::path;
   }

@@ -37,6 +37,7 @@ class Guidance {
     std::uint64_t goal_number;         ///< another one whenever the goal or the load is another one
     std::uint64_t world;               ///< number of the snapshot
     const scene::MotionState* target;  ///< that a follow goal has; else null
+    const CertifiedPath* in_force;     ///< along which a stop goes on; else null
   };
   /// To be called once per tick, before the planner. @return what has arrived
   News update(const Now& now, GuideSearch& search);
@@ -55,6 +56,10 @@ class Guidance {
   void tell(hamelin_goal& goal) const noexcept;
   /// Counts whatever is shown.
   [[nodiscard]] std::uint64_t number() const noexcept { return number_; }
+  /// The motion along the path; null if there is none.
+  [[nodiscard]] const CertifiedPath* motion() const noexcept {
+    return mode_ == Mode::guided && !follows() ? motion_.get() : nullptr;
+  }
   [[nodiscard]] const Figures& figures() const noexcept { return figures_; }
   /// Why the last search found none.
   [[nodiscard]] std::string_view cause() const noexcept { return cause_; }
@@ -83,6 +88,8 @@ class Guidance {
   double check_time_s_;
   Mode mode_ = Mode::off;
   Eigen::MatrixXd path_;
+  /// Along the path, and along the one before, which may still be in force.
+  std::unique_ptr<CertifiedPath> motion_, before_;
   Eigen::Index count_ = 0;  ///< way-points of the path
   double margin_m_ = 0.0;   ///< that it keeps
   Eigen::Index point_ = 0;  ///< that is shown to a planner that follows none

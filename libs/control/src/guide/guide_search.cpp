@@ -15,9 +15,11 @@ GuideRequest::GuideRequest(Index dof, Index points_max)
 }
 
 GuideSearch::GuideSearch(const model::Model& model, const World& world, const WorldView& view,
-                         search::Settings settings, Index points_max, bool threaded)
+                         search::Settings settings, std::unique_ptr<PathTiming> timing,
+                         Index points_max, bool threaded)
     : search_(model, std::move(settings)),
       query_(model, world, view),
+      timing_(std::move(timing)),
       request_(model.dof(), points_max),
       answers_(std::make_unique<GuideAnswer>()) {
   if (threaded) thread_ = std::thread([this] { work(); });
@@ -58,6 +60,20 @@ bool GuideSearch::still_clear() {
   return request_.kept_count > 0;
 }
 
+void GuideSearch::find(GuideAnswer& out) {
+  out.path = search_.search({request_.q,
+                             {request_.goal},
+                             request_.search,
+                             request_.kept.leftCols(request_.kept_count)},
+                            query_);
+  out.checks += out.path.checks;
+  if (!out.path.found() || !timing_) return;
+  const long before = query_.checks() + timing_->checks();
+  out.motion = timing_->make(out.path.points, search_.margins(), query_);
+  if (out.motion) out.motion->snapshot = out.snapshot;
+  out.checks += query_.checks() + timing_->checks() - before;
+}
+
 void GuideSearch::answer() {
   auto out = std::make_unique<GuideAnswer>();
   const long before = query_.checks();
@@ -66,14 +82,7 @@ void GuideSearch::answer() {
   out->kept = still_clear();
   out->checks = query_.checks() - before;
   try {
-    if (!out->kept) {
-      out->path = search_.search({request_.q,
-                                  {request_.goal},
-                                  request_.search,
-                                  request_.kept.leftCols(request_.kept_count)},
-                                 query_);
-      out->checks += out->path.checks;
-    }
+    if (!out->kept) find(*out);
   } catch (const std::exception& e) {  // on a thread of its own nobody could catch it
     out->path.cause = e.what();
   }

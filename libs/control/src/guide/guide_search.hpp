@@ -2,9 +2,11 @@
 #include <Eigen/Core>
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <thread>
 
 #include "guide/guide_query.hpp"
+#include "guide/path_timing.hpp"
 #include "hamelin/search/search.hpp"
 #include "loop/newest.hpp"
 
@@ -31,6 +33,8 @@ struct GuideAnswer {
   bool kept = false;           ///< whether the path of the request is still clear
   long checks = 0;
   search::Path path;
+  /// The motion along the path; null if there is none, or none is asked for.
+  std::unique_ptr<CertifiedPath> motion;
 };
 
 /// Answers the requests of a control loop, one at a time: on a thread of its own, or where its
@@ -38,10 +42,12 @@ struct GuideAnswer {
 class GuideSearch {
  public:
   /// @param points_max as for GuideRequest
+  /// @param timing null: no motions along paths are made
   /// @param threaded whether it has a thread of its own; else run() does the work
   /// model, world and view must outlive this
   GuideSearch(const model::Model& model, const World& world, const WorldView& view,
-              search::Settings settings, Eigen::Index points_max, bool threaded);
+              search::Settings settings, std::unique_ptr<PathTiming> timing,
+              Eigen::Index points_max, bool threaded);
   GuideSearch(const GuideSearch&) = delete;
   GuideSearch& operator=(const GuideSearch&) = delete;
   ~GuideSearch();
@@ -53,7 +59,7 @@ class GuideSearch {
   /// Starts the work on request().
   void ask() noexcept;
   /// The newest answer, valid until the next call.
-  [[nodiscard]] const GuideAnswer& take() noexcept { return answers_.take(); }
+  [[nodiscard]] GuideAnswer& take() noexcept { return answers_.take(); }
   /// Does the work that is waiting, if there is any, without a thread of its own.
   void run();
 
@@ -62,9 +68,11 @@ class GuideSearch {
   void work();
   void answer();
   [[nodiscard]] bool still_clear();
+  void find(GuideAnswer& out);
 
   search::Search search_;
   GuideQuery query_;
+  std::unique_ptr<PathTiming> timing_;
   GuideRequest request_;
   Newest<GuideAnswer> answers_;
   std::atomic<State> state_{State::idle};

@@ -12,6 +12,7 @@
 #include "loop/goal_list.hpp"
 #include "loop/loaded_arm.hpp"
 #include "loop/mailbox.hpp"
+#include "loop/path_reference.hpp"
 
 namespace hamelin::control {
 
@@ -180,6 +181,7 @@ void Controller::ask_planner() {
   }
   listed_ = listed;
   if (guidance_) update_guidance();
+  update_path();
   goal_ = {goal_for_planner(), goal_.number, index};
   reset_ = false;
   const double since_s = options_.clock_s != nullptr ? options_.clock_s() : 0.0;

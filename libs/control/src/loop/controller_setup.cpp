@@ -15,6 +15,7 @@
 #include "loop/goal_list.hpp"
 #include "loop/loaded_arm.hpp"
 #include "loop/mailbox.hpp"
+#include "loop/path_reference.hpp"
 
 namespace hamelin::control {
 
@@ -149,6 +150,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       mail_(std::make_unique<Mailbox>(scene_.goals)),
       goal_list_(&mail_->goals.take()),
       reference_(nominal_.dof()),
+      path_reference_(std::make_unique<PathReference>(nominal_.dof())),
       goals_(goal_list_->goals, scene_.stall, arm_->model) {
   check_follows(scene_, plugin);
   expect_target(scene_.goals);
@@ -193,6 +195,7 @@ void Controller::reset() {
   expect_target(newest_goals_);
   target_.stop();
   reference_.stop();
+  path_reference_->stop();
   make_guidance();
   scene::Scene scene = scene_;
   scene.goals = newest_goals_;

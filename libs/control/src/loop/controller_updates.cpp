@@ -13,6 +13,7 @@
 #include "loop/goal_list.hpp"
 #include "loop/loaded_arm.hpp"
 #include "loop/mailbox.hpp"
+#include "loop/path_reference.hpp"
 
 namespace hamelin::control {
 
@@ -309,7 +310,12 @@ void Controller::update_reference() {
 }
 
 const hamelin_goal* Controller::goal_for_planner() {
-  if (guidance_ && guidance_->goal() != nullptr) return guidance_->goal();
+  if (guidance_ && guidance_->goal() != nullptr) {
+    if (path_reference_->path() == nullptr) return guidance_->goal();
+    live_goal_ = *guidance_->goal();
+    control::set_reference(path_reference_->state(), live_goal_);
+    return &live_goal_;
+  }
   if (answer_.target == nullptr && answer_.reference == nullptr && !guidance_) return listed_;
   live_goal_ = *listed_;
   if (guidance_) guidance_->tell(live_goal_);
@@ -321,7 +327,7 @@ const hamelin_goal* Controller::goal_for_planner() {
 void Controller::update_guidance() {
   const Guidance::News news =
       guidance_->update({time_s_, period_s_, q(), goals_.goal(), listed_number_ + 1,
-                         arm_->view.snapshot(), answer_.target},
+                         arm_->view.snapshot(), answer_.target, path_in_force()},
                         *arm_->guide);
   if (const std::uint64_t number = guidance_->number(); number != guidance_number_) {
     guidance_number_ = number;
@@ -334,6 +340,27 @@ void Controller::update_guidance() {
   else
     append(line, "guide: {}", guidance_->cause());
   options_.log(HAMELIN_LOG_INFO, line.view());
+}
+
+const CertifiedPath* Controller::path_in_force() const noexcept {
+  const FailSafe& motion = arm_->stop().motion();
+  return motion.along_path() ? motion.path_stop().path() : nullptr;
+}
+
+// The motion along the path that a search has found.
+void Controller::update_path() {
+  const CertifiedPath* const path = guidance_ ? guidance_->motion() : nullptr;
+  Shield* const shield = arm_->shield.get();
+  if (path != path_reference_->path()) path != nullptr ? path_reference_->start(*path) : path_reference_->stop();
+  if (shield != nullptr && shield->path_proof().path() != path) shield->set_path(path, surroundings());
+  if (path == nullptr) return;
+  const ReferenceState& state =
+      path_reference_->update({period_s_, q(), v(), answer_.stopping, arm_->view.speed_scale()});
+  answer_.reference = &state;
+  if (shield != nullptr)
+    shield->note_path(path_reference_->next(
+        static_cast<double>(drive_options_->delay_periods) * period_s_));
+  if (!state.ended && state.rate > 0.0) goals_.forget_rest();
 }
 
 void Controller::take_params() {

@@ -143,6 +143,7 @@ void set_reference(const ReferenceState& reference, hamelin_goal& goal) noexcept
   goal.reference_a = reference.a.data();
   goal.reference_time_s = reference.time_s;
   goal.reference_rate = reference.rate;
+  goal.reference_certified = reference.certified ? 1 : 0;
 }
 
 std::string joints_defect(const scene::JointTrajectory& trajectory, const model::Model& model) {

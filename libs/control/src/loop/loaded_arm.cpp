@@ -54,10 +54,14 @@ bool searches_paths(const scene::Scene& scene, const planning::Plugin& plugin) n
 std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, const Json& params,
                                                    const ArmSetup& arm) {
   if (!searches_paths(scene, arm.plugin)) return nullptr;
+  const LimitReserve reserve = shield ? shield->limit_reserve() : LimitReserve{};
+  std::unique_ptr<PathTiming> timing;
+  if (arm.plugin.follows_trajectories())
+    timing = std::make_unique<PathTiming>(scene, model, view.self_field(),
+                                          path_limits(scene, model, reserve, params));
   return std::make_unique<GuideSearch>(
-      model, arm.world, view,
-      guide_settings(scene, model, view, shield ? shield->limit_reserve() : LimitReserve{}, params),
-      static_cast<Eigen::Index>(arm.path_points_max), arm.guide_thread);
+      model, arm.world, view, guide_settings(scene, model, view, reserve, params),
+      std::move(timing), static_cast<Eigen::Index>(arm.path_points_max), arm.guide_thread);
 }
 
 planning::SetupData LoadedArm::make_setup(const scene::Scene& scene, const ArmSetup& arm) {

@@ -6,24 +6,34 @@ namespace hamelin::control {
 
 using Eigen::VectorXd;
 
-FailSafe::FailSafe(Eigen::Index dof) : stop_(dof) {
+FailSafe::FailSafe(Eigen::Index dof) : stop_(dof), path_stop_(dof) {
   way_ = target_ = VectorXd::Zero(dof);
 }
 
 void FailSafe::set_stop(const VectorXd& q, const VectorXd& v, const VectorXd& a,
                         const StopMotion::Braking& braking) {
   move_s_ = 0.0;
+  along_path_ = false;
   stop_.set(q, v, a, braking);
 }
 
 void FailSafe::set_at_rest(const VectorXd& q) {
   move_s_ = 0.0;
+  along_path_ = false;
   stop_.set_at_rest(q);
+}
+
+void FailSafe::set_path_stop(const CertifiedPath& path, const PathStop::Place& from,
+                             const VectorXd& e, const VectorXd& e_rate,
+                             const PathStop::Bounds& bounds) {
+  move_s_ = 0.0;
+  along_path_ = true;
+  path_stop_.set(path, from, e, e_rate, bounds);
 }
 
 void FailSafe::set_move(const VectorXd& target, double duration_s) {
   target_ = target;
-  way_ = target - stop_.end();
+  way_ = target - stop_end();
   move_s_ = duration_s;
 }
 
@@ -35,10 +45,10 @@ FailSafe::Profile FailSafe::profile(double share) {
 
 void FailSafe::at(double time_s, VectorXd& q, VectorXd& v) const {
   if (!moves() || time_s < stop_s()) {
-    stop_.at(time_s, q, v);
+    along_path_ ? path_stop_.at(time_s, q, v) : stop_.at(time_s, q, v);
   } else {
     const Profile at = profile((time_s - stop_s()) / move_s_);
-    q = stop_.end() + at.position * way_;
+    q = stop_end() + at.position * way_;
     v = at.velocity / move_s_ * way_;
   }
 }

@@ -34,6 +34,8 @@ constexpr double sampled_speed_reserve = 0.02, estimated_speed_reserve = 0.1,
 constexpr double smallest_m = 1e-9;
 // The share of the speed limits that the move of an evasion uses.
 constexpr double move_speed_share = 0.8;
+// So many checks of a path's proof are made per step after the world has changed.
+constexpr long path_checks = 16;
 // Velocities may exceed their limit by rounding.
 constexpr double velocity_rounding = 1e-9;
 
@@ -105,6 +107,7 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       arm_to_(model),
       arm_line_(model),
       arm_end_(model),
+      path_proof_(model, levers_, self),
       lead_s_(sampled_ ? scene.actuation.delay_s : 0.0),
       move_time_(model, move_limits(scene, limits_, changes, period_s)),
       move_line_(model, levers_, self),
@@ -116,7 +119,9 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       bounded_check_(model, levers_) {
   const Index n = model.dof();
   set_reserve(scene, scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(n));
-  for (auto* x : {&line_stray_, &zero_, &way_, &hold_}) x->setZero(n);
+  for (auto* x : {&line_stray_, &zero_, &way_, &hold_, &path_q_, &path_v_, &path_a_, &e_, &e_rate_})
+    x->setZero(n);
+  path_effort_ = torque_share_ * limits_.effort_max;
   aside_ = zero_;
   asides_.emplace(model, limits_, reserve_.position, scene.seed);
   for (const auto& shape : model.shapes()) shape_names_.push_back(model.describe(shape));
@@ -145,6 +150,7 @@ void Shield::notice(const Surroundings& world) {
   stop_line_.forget();
   move_line_.forget();
   other_line_.forget();
+  path_proof_.forget(world.environment, world.time_s, path_cursor_.node);
   for (MoverCheck* check :
        {&stop_check_, &move_check_, &other_check_, &force_check_, &bounded_check_})
     check->forget();
@@ -212,6 +218,10 @@ void Shield::take_tried() {
   stop_.begin(tried_, straying_.bounds());
   stopping_ = changed_ = false;
   run_ = 0;
+  if (stop_.motion().along_path()) {
+    ++counts_.along_path;
+    return;
+  }
   largest_margin_ = std::max(largest_margin_, stop_line_.largest_stray_m());
   if (stop_.motion().stop().braking().ramp_s > 0.0)
     largest_margin_ = std::max(largest_margin_, ramp_line_.largest_stray_m());
@@ -221,6 +231,7 @@ bool Shield::accept(const Surroundings& world, const Step& step) {
   const Node& to = step.to;
   ++counts_.steps;
   notice(world);
+  path_proof_.advance(path_checks);
   const bool movers = list_movers(world, step.from);
   const bool dwells = stopping_ && run_ < dwell_ && !stop_.at_rest();
   if (!dwells && to.q.allFinite() && to.v.allFinite() && verify(world, step) &&
@@ -266,7 +277,7 @@ void Shield::check_overtaken(const Surroundings& world, const Node& node) {
   };
   const LineCheck::End from = place(node.q, arm_from_), end = place(stop_.motion().end(), arm_end_);
   const bool goes_on = stop_.motion().moves() && !stop_.has_stopped();
-  const LineCheck::End turn = goes_on ? place(stop_.motion().stop().end(), arm_line_) : from;
+  const LineCheck::End turn = goes_on ? place(stop_.motion().stop_end(), arm_line_) : from;
   if ((goes_on && blocked(from, turn)) || blocked(turn, end)) ++counts_.overtaken;
 }
 
@@ -314,10 +325,15 @@ bool Shield::is_clear(LineCheck& line, const Surroundings& world, const LineChec
   return false;
 }
 
-// In the order of cost.
 bool Shield::verify(const Surroundings& world, const Step& step) {
+  if (!within_velocity(step.from.v, step.to.v) || !within_velocity(step.from.v, step.departure))
+    return false;
+  return (path_proof_.path() != nullptr && verify_path(step)) || verify_line(world, step);
+}
+
+// In the order of cost.
+bool Shield::verify_line(const Surroundings& world, const Step& step) {
   const Node &from = step.from, &to = step.to;
-  if (!within_velocity(from.v, to.v) || !within_velocity(from.v, step.departure)) return false;
   if (!find_stop(step, BrakingRate::usual_utilisation)) return false;
   if (!stop_is_safe(world, step)) {
     // the shortest stop may be safe where a longer one is not

@@ -27,6 +27,7 @@
 #include "shield/line_check.hpp"
 #include "shield/move_time.hpp"
 #include "shield/mover_check.hpp"
+#include "shield/path_proof.hpp"
 #include "shield/straying.hpp"
 
 namespace hamelin::control {
@@ -80,6 +81,13 @@ class Shield {
     const Eigen::VectorXd& torque;
     const Eigen::VectorXd& disturbance;
   };
+  /// The path along which the arm may stop; null: none. It must stay until another one is set and
+  /// the stop in force is not along it.
+  void set_path(const CertifiedPath* path, const Surroundings& world);
+  /// Where the arm should be on it. @param ahead_s time until the step that is tried
+  void note_path(const PathStop::Place& at) noexcept { path_place_ = at; }
+  /// What is proved of the path.
+  [[nodiscard]] const PathProof& path_proof() const noexcept { return path_proof_; }
   /// Decides on a step. @return whether it is accepted; else see refusal()
   [[nodiscard]] bool accept(const Surroundings& world, const Step& step);
   /// Counts a step that cannot be tried: there is no usable answer, or no state after it.
@@ -108,6 +116,15 @@ class Shield {
   /// Why the arm cannot begin at a node, and what would do.
   [[nodiscard]] std::string defect_at_start(const Surroundings& world, const Node& node);
   [[nodiscard]] bool verify(const Surroundings& world, const Step& step);
+  /// The same with a stop on a straight line.
+  [[nodiscard]] bool verify_line(const Surroundings& world, const Step& step);
+  // Along a path, in shield_path.cpp.
+  [[nodiscard]] bool verify_path(const Step& step);
+  /// The place of the path near a node, and the node's deviation from it, in e_ and e_rate_.
+  [[nodiscard]] PathStop::Place project(const Node& node, const PathStop::Place& near);
+  /// Whether an arm that strays from the path by this much keeps the margins and the joint limits.
+  [[nodiscard]] bool within_tube(const Straying::Bounds& stray, Eigen::Index first,
+                                 Eigen::Index last);
   /// The stop that was verified is now the one that goes on if the next step is refused.
   void take_tried();
   /// Sets tried_ to a stop after the step. @return whether there is one
@@ -186,6 +203,11 @@ class Shield {
   Eigen::VectorXd no_addition_;  ///< of size zero
   double largest_margin_ = 0.0;
   Eigen::VectorXd line_stray_, zero_, way_, hold_;
+
+  PathProof path_proof_;
+  PathStop::Place path_place_;
+  Eigen::VectorXd path_q_, path_v_, path_a_, e_, e_rate_, path_effort_;
+  timing::TimedPath::Cursor path_cursor_;
 
   std::optional<std::uint64_t> snapshot_;  ///< for which the lines' anchors hold
   std::size_t existing_ = 0;               ///< obstacles at the last call

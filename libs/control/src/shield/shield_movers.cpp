@@ -92,7 +92,7 @@ void Shield::go_on_among_movers(const Surroundings& world) {
     tried_.set_at_rest(stop_.motion().end());
     from_s = 0.0;
   }
-  straying_.bound(tried_.stop());
+  straying_.bound_stop(tried_);
   const Foresight evasion = find_evasion(world, force_check_, from_s, zero_);
   if (evasion.proof == MoverProof::none) return;
   stop_.turn_to(tried_, from_s, straying_.bounds());
@@ -168,7 +168,7 @@ Shield::Foresight Shield::find_fail_safe(const Surroundings& world, const Step& 
   if (hit && evasion.clear_s > stop.clear_s) return evasion;
   if (tried_.moves()) {  // it is needed when the stop is not clear any more
     tried_.drop_move();
-    straying_.bound(tried_.stop());
+    straying_.bound_stop(tried_);
   }
   return stop;
 }
@@ -182,7 +182,7 @@ Shield::Foresight Shield::find_evasion(const Surroundings& world, MoverCheck& st
     if (has_aside_) return found;
   }
   stopped.find_threat(ws_, {world.environment, world.time_s, lead_s_ + period_s_, predicted_});
-  asides_->propose(ws_, stopped.threat(), tried_.stop().end(), ahead, aside_);
+  asides_->propose(ws_, stopped.threat(), tried_.stop_end(), ahead, aside_);
   const Foresight found = try_move(other_line_, other_check_, world, from_s, aside_);
   has_aside_ = found.proof != MoverProof::none;
   return found;
@@ -191,7 +191,7 @@ Shield::Foresight Shield::find_evasion(const Surroundings& world, MoverCheck& st
 Shield::Foresight Shield::try_move(LineCheck& line, MoverCheck& check, const Surroundings& world,
                                    double from_s, const VectorXd& target) {
   constexpr Foresight none{MoverProof::none, 0.0, 0.0};
-  const VectorXd& from = tried_.stop().end();
+  const VectorXd& from = tried_.stop_end();
   way_ = target - from;
   const std::optional<double> time_s = move_time_.find(from, way_);
   if (!time_s || *time_s > MoverCheck::horizon_s) return none;
@@ -203,7 +203,7 @@ Shield::Foresight Shield::try_move(LineCheck& line, MoverCheck& check, const Sur
     found = prove(check, world, {tried_, straying_.bounds(), from_s, lead_s_ + period_s_});
   if (found.proof != MoverProof::none) return found;
   tried_.drop_move();
-  straying_.bound(tried_.stop());
+  straying_.bound_stop(tried_);
   return none;
 }
 

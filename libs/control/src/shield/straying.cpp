@@ -118,6 +118,29 @@ void Straying::bound(const StopMotion& stop) {
   if (noise_ > 0.0) add_noise();
 }
 
+// At five places of the stop, the largest velocity and acceleration of each joint.
+void Straying::bound(const PathStop& stop) {
+  constexpr int places = 5;
+  torque_.setZero();  // the largest velocities
+  bias_.setZero();    // and accelerations
+  for (int k = 0; k < places; ++k) {
+    stop.path_at(stop.braking_s() * static_cast<double>(k) / places, q_, velocity_, acceleration_);
+    torque_ = torque_.cwiseMax(velocity_.cwiseAbs());
+    bias_ = bias_.cwiseMax(acceleration_.cwiseAbs());
+  }
+  begin(torque_, between_examined * bias_);
+  bounds_.tracking += stop.widest();
+  if (has_model_errors()) {
+    for (const double share : {0.0, 0.5, 0.9}) {
+      stop.path_at(share * stop.braking_s(), q_, velocity_, acceleration_);
+      include_model_errors({q_, velocity_, acceleration_, stop.duration_s(), 0.0});
+    }
+    bounds_.errors *= between_examined;
+    bounds_.shapes *= between_examined;
+  }
+  if (noise_ > 0.0) add_noise();
+}
+
 void Straying::bound_at_rest(const VectorXd& q) {
   velocity_.setZero();
   begin(velocity_, velocity_);
@@ -133,7 +156,7 @@ void Straying::include_move(const FailSafe& motion) {
   begin(velocity_, acceleration_);
   if (has_model_errors()) {
     for (const double share : {0.0, 0.5, 1.0}) {
-      q_ = motion.stop().end() + share * motion.way();
+      q_ = motion.stop_end() + share * motion.way();
       include_model_errors({q_, velocity_, acceleration_, time_s, 0.0});
     }
     bounds_.errors *= between_examined;

@@ -40,10 +40,18 @@ class Straying {
 
   /// Sets the bounds for a stop.
   void bound(const StopMotion& stop);
+  /// The same for a stop along a path.
+  void bound(const PathStop& stop);
+  /// Sets the bounds for the stop of a motion.
+  void bound_stop(const FailSafe& motion) {
+    motion.along_path() ? bound(motion.path_stop()) : bound(motion.stop());
+  }
   /// Sets the bounds for an arm that rests at q.
   void bound_at_rest(const Eigen::VectorXd& q);
   /// Raises them, where need be, to those of the move of a FailSafe after its stop.
   void include_move(const FailSafe& motion);
+  /// Adds to what the motion itself causes.
+  void add_tracking(const Eigen::VectorXd& more) { bounds_.tracking += more; }
   [[nodiscard]] const Bounds& bounds() const noexcept { return bounds_; }
   [[nodiscard]] const Eigen::VectorXd& tracking() const noexcept { return bounds_.tracking; }
   [[nodiscard]] const Eigen::VectorXd& errors() const noexcept { return bounds_.errors; }

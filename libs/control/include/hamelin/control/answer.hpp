@@ -99,6 +99,7 @@ struct ShieldCounts {
   /// Steps with moving obstacles in reach, by what is proved after them.
   std::array<long, mover_proofs> proofs{};
   long evasions = 0;  ///< of the stops, those that were followed by a move when they began
+  long along_path = 0;  ///< steps that were accepted with a stop along a path
 };
 
 /// What a shield did last, and since the start.

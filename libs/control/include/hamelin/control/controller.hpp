@@ -25,6 +25,8 @@ namespace hamelin::control {
 
 class DiscreteArm;
 class Guidance;
+class PathReference;
+struct CertifiedPath;
 class Shield;
 class Stop;
 struct GoalList;
@@ -294,6 +296,10 @@ class Controller {
   void take_params();
   /// Lets the guide choose what the planner is shown.
   void update_guidance();
+  /// Moves on along the path that the guide has found, if there is one.
+  void update_path();
+  /// The path along which the stop in force goes; else null.
+  [[nodiscard]] const CertifiedPath* path_in_force() const noexcept;
   /// Calls the planner; stops the arm if it fails or was late too often.
   void ask_planner();
   void note_time(double planner_s);
@@ -340,6 +346,7 @@ class Controller {
   bool receives_ = false;      ///< whether the newest goals follow a streamed target
   LiveTarget target_;
   LiveReference reference_;
+  std::unique_ptr<PathReference> path_reference_;
   const hamelin_goal* listed_ = nullptr;  ///< the goal of the last tick in its list
   hamelin_goal live_goal_{};              ///< the current one if it changes from tick to tick
   std::uint64_t used_params_ = 0;

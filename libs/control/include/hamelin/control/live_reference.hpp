@@ -13,6 +13,7 @@ struct ReferenceState {
   double rate = 1.0;        ///< how fast that clock runs, 0 to 1
   double error = 0.0;       ///< largest distance of a joint from q [rad or m]
   bool ended = false;       ///< whether time_s is the trajectory's end
+  bool certified = false;   ///< whether it is that of a path which is proved to be clear
 };
 
 /// The reference of a trajectory goal from tick to tick, docs/theory.md (18.16). It belongs to the

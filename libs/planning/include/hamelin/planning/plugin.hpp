@@ -186,6 +186,7 @@ class Setup {
 struct Reference {
   ConstVectorMap q, v, a;
   double time_s, rate;
+  bool certified;  ///< whether it is proved to be clear, and the shield can stop along it
 };
 
 /// The input of one tick.
@@ -216,7 +217,9 @@ class Tick {
       return std::nullopt;
     return Reference{ConstVectorMap(goal.reference_q, dof_), ConstVectorMap(goal.reference_v, dof_),
                      ConstVectorMap(goal.reference_a, dof_), goal.reference_time_s,
-                     goal.reference_rate};
+                     goal.reference_rate,
+                     HAMELIN_HAS_FIELD(&goal, hamelin_goal, reference_certified) &&
+                         goal.reference_certified != 0};
   }
   /// Another number means another goal.
   [[nodiscard]] std::uint64_t goal_number() const { return raw_->goal_number; }

@@ -173,6 +173,9 @@ typedef struct hamelin_goal {
   int32_t path_search;
   /* The clearance that a path which was searched keeps away from its ends [m]; 0: not known. */
   double path_margin_m;
+  /* 1: the motion of the reference is proved to be clear, and the shield can stop along it: an arm
+   * that stays close to it needs no other margin. */
+  int32_t reference_certified;
 } hamelin_goal;
 
 /* A gyroscopic term: the force w x (velocity of the point) acts at a point of a link. It does no

@@ -29,8 +29,9 @@ class EdgeCheck {
   /// @param self null if self-collision is not modelled
   EdgeCheck(const model::Model& model, const scene::SelfField* self);
 
-  /// The obstacles of the following checks; must stay until the next call.
-  void set_environment(const scene::Environment& environment, double time_s);
+  /// The obstacles of the following checks; must stay until the next call. Without `movers`, those
+  /// that move are left out.
+  void set_environment(const scene::Environment& environment, double time_s, bool movers = true);
   /// Pairs of parts keep no more than that in the following checks [m].
   void set_self_most(double most_m) noexcept { self_most_ = most_m; }
   /// The smallest distance between parts of the arm at q [m], or `most_m` if that is less.

@@ -32,8 +32,8 @@ class LineCheck {
   ~LineCheck();
 
   /// The obstacles of the following checks; must stay until the next call. Obstacles that move
-  /// stand where they are at that time.
-  void set_environment(const scene::Environment& environment, double time_s);
+  /// stand where they are at that time; without `movers` they are left out.
+  void set_environment(const scene::Environment& environment, double time_s, bool movers = true);
   /// The margins of the following calls; copied. Allocates only for more than 32 places.
   void set_margins(const Margins& margins);
   /// Whether the arm is proved to keep more than the margins on the straight joint motion from a to

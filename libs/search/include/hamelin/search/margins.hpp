@@ -37,6 +37,10 @@ class Margins {
   [[nodiscard]] const std::vector<Place>& places() const noexcept { return places_; }
   /// What a configuration must keep [m].
   [[nodiscard]] double required(const Eigen::VectorXd& q) const;
+  /// The same margins, all of them larger by so much [m].
+  [[nodiscard]] Margins raised(double by_m) const;
+  /// By how much they change at most per distance between configurations [m].
+  [[nodiscard]] double slope() const;
   /// The least that a configuration on the line between two others must keep.
   [[nodiscard]] double least(const Eigen::VectorXd& a, const Eigen::VectorXd& b) const;
 

@@ -82,6 +82,8 @@ class Search {
   bool advance(long checks);
   /// The path of a search that has ended.
   [[nodiscard]] const Path& path() const noexcept;
+  /// What its lines keep; only if one was found.
+  [[nodiscard]] const Margins& margins() const noexcept;
   /// begin() and advance() to the end.
   [[nodiscard]] Path search(const Problem& problem, Query& query);
 

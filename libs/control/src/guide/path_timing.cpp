@@ -1,0 +1,118 @@
+#include "guide/path_timing.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace hamelin::control {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+// Shares of the limits that a motion uses. The rest is for what keeps the arm on it.
+constexpr double speed_share = 0.99, acceleration_share = 14.0 / 15.0, torque_share_most = 0.9,
+                 torque_share_kept = 0.04;
+constexpr double default_acceleration = 15.0;  // [rad/s² or m/s²]
+// Nodes of a motion that cost as much as a check.
+constexpr Index nodes_per_check = 4;
+// The mass matrix is evaluated at so many places, and may be larger between them.
+constexpr int mass_places = 5;
+constexpr double mass_between = 1.1;
+
+}  // namespace
+
+timing::Limits path_limits(const scene::Scene& scene, const model::Model& model,
+                           const LimitReserve& reserve, const Json& params) {
+  const ModelledLimits modelled = modelled_limits(scene, model.robot());
+  timing::Limits out;
+  out.velocity = modelled.velocity_max;
+  if (reserve.velocity.size() == out.velocity.size()) out.velocity -= reserve.velocity;
+  out.velocity *= speed_share;
+  const auto found = params.find("acceleration_max");
+  const double most = found != params.end() && found->is_number() ? found->get<double>()
+                                                                   : default_acceleration;
+  out.acceleration = VectorXd::Constant(model.dof(), acceleration_share * most);
+  const double share =
+      std::min(torque_share_most, scene::safety_bounds(scene).torque_share - torque_share_kept);
+  out.torque = share * modelled.effort_max;
+  return out;
+}
+
+PathTiming::PathTiming(const scene::Scene& scene, const model::Model& model,
+                       const scene::SelfField* self, timing::Limits limits)
+    : model_(model),
+      levers_(model, self),
+      blending_(levers_),
+      law_(model, std::move(limits)),
+      ws_(model) {
+  const ModelledLimits modelled = modelled_limits(scene, model.robot());
+  q_lower_ = modelled.q_lower;
+  q_upper_ = modelled.q_upper;
+}
+
+std::unique_ptr<CertifiedPath> PathTiming::make(const MatrixXd& points,
+                                                const search::Margins& margins,
+                                                search::Query& query) {
+  timing::BlendedPath path(points);
+  blending_.widen(path, margins, query);
+  auto out = std::make_unique<CertifiedPath>();
+  out->motion.curve = path.curve();
+  const bool found = law_.solve(out->motion);
+  cause_ = found ? std::string_view() : law_.cause();
+  if (!found) return nullptr;
+  out->limits = law_.limits();
+  checks_ += out->motion.nodes() / nodes_per_check;
+  set_margins(*out, margins);
+  set_room(*out);
+  set_mass(*out);
+  return out;
+}
+
+// docs/theory.md (14.30)
+void PathTiming::set_margins(CertifiedPath& out, const search::Margins& margins) const {
+  const timing::TimedPath& motion = out.motion;
+  const Index n = motion.nodes() - 1;
+  out.clearance_m.resize(n);
+  out.self_m.resize(n);
+  const double loss = motion.curve.pieces() > 1 ? timing::Blending::loss_m : 0.0;
+  VectorXd from(model_.dof()), to(from), unused(from);
+  motion.curve.at(0.0, from, unused, unused);
+  for (Index k = 0; k < n; ++k) {
+    motion.curve.at(motion.place[k + 1], to, unused, unused);
+    out.clearance_m[k] = margins.least(from, to) - loss;
+    out.self_m[k] = std::min(margins.least(from, to), margins.self_most_m()) - loss;
+    from.swap(to);
+  }
+}
+
+void PathTiming::set_room(CertifiedPath& out) const {
+  if (q_lower_.size() == 0) return;
+  const timing::TimedPath& motion = out.motion;
+  const Index n = motion.nodes() - 1;
+  out.room.resize(model_.dof(), n);
+  VectorXd from(model_.dof()), to(from), unused(from), bend(from);
+  for (Index k = 0; k < n; ++k) {
+    const double a = motion.place[k], b = motion.place[k + 1];
+    const Index piece = motion.curve.at(0.5 * (a + b), from, to, unused);
+    motion.curve.bound_bend(piece, a, b, bend);
+    motion.curve.at(a, from, unused, unused);
+    motion.curve.at(b, to, unused, unused);
+    out.room.col(k) = (from.cwiseMin(to) - q_lower_).cwiseMin(q_upper_ - from.cwiseMax(to)) -
+                      0.125 * (b - a) * (b - a) * bend;
+  }
+}
+
+void PathTiming::set_mass(CertifiedPath& out) {
+  MatrixXd M(model_.dof(), model_.dof());
+  VectorXd q(model_.dof()), unused(q);
+  out.mass = VectorXd::Zero(model_.dof());
+  for (int k = 0; k < mass_places; ++k) {
+    out.motion.curve.at(out.motion.curve.end() * k / (mass_places - 1), q, unused, unused);
+    dynamics::mass_matrix(model_, ws_, q, M);
+    out.mass = out.mass.cwiseMax(mass_between * M.cwiseAbs().rowwise().sum());
+  }
+}
+
+}  // namespace hamelin::control

@@ -1,0 +1,54 @@
+#pragma once
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+
+#include "guide/guide_query.hpp"
+#include "hamelin/control/planner_setup.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/scene/levers.hpp"
+#include "hamelin/timing/blended_path.hpp"
+#include "hamelin/timing/time_law.hpp"
+#include "shield/certified_path.hpp"
+
+namespace hamelin::control {
+
+/// The limits of motions along paths: within those of planner and shield, so that neither has to
+/// change them.
+/// @param reserve what a shield keeps @param params of the planner, for acceleration_max
+[[nodiscard]] timing::Limits path_limits(const scene::Scene& scene, const model::Model& model,
+                                         const LimitReserve& reserve, const Json& params);
+
+/// Makes timed motions of paths that a search has found, and says what is proved of them.
+class PathTiming {
+ public:
+  /// @param model kept by reference @param self null if self-collision is not modelled
+  PathTiming(const scene::Scene& scene, const model::Model& model, const scene::SelfField* self,
+             timing::Limits limits);
+
+  /// @param points way-points @param margins that the lines between them are proved to keep
+  /// @param query proves the blends
+  /// @return null if there is no motion; see cause()
+  [[nodiscard]] std::unique_ptr<CertifiedPath> make(const Eigen::MatrixXd& points,
+                                                    const search::Margins& margins,
+                                                    search::Query& query);
+  [[nodiscard]] const std::string& cause() const noexcept { return cause_; }
+  /// Work beside that of the query, in checks.
+  [[nodiscard]] long checks() const noexcept { return checks_; }
+
+ private:
+  void set_margins(CertifiedPath& out, const search::Margins& margins) const;
+  void set_room(CertifiedPath& out) const;
+  void set_mass(CertifiedPath& out);
+
+  const model::Model& model_;
+  scene::Levers levers_;
+  timing::Blending blending_;
+  timing::TimeLaw law_;
+  Eigen::VectorXd q_lower_, q_upper_;
+  dynamics::Workspace ws_;
+  std::string cause_;
+  long checks_ = 0;
+};
+
+}  // namespace hamelin::control

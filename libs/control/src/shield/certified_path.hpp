@@ -1,0 +1,80 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "hamelin/timing/time_law.hpp"
+#include "hamelin/timing/timed_path.hpp"
+
+namespace hamelin::control {
+
+/// A timed motion that ends at rest, with what is proved of it: docs/theory.md (14.30). An interval
+/// is that between two nodes of the motion.
+struct CertifiedPath {
+  timing::TimedPath motion;
+  /// What the arm keeps at least from all that stands still, and its parts from each other, on each
+  /// interval [m].
+  Eigen::VectorXd clearance_m, self_m;
+  /// How far each joint is from its limits on each interval, dof × intervals [rad or m]; of size
+  /// zero: there are none.
+  Eigen::MatrixXd room;
+  timing::Limits limits;  ///< that it keeps
+  /// Sums of the rows of |M|, the largest on the path: bounds of torques per acceleration.
+  Eigen::VectorXd mass;
+  std::uint64_t snapshot = 0;  ///< of the world for which it is proved
+};
+
+/// A motion to rest along a certified path, from near it: docs/theory.md (14.31)–(14.33). Where
+/// Γ(θ) is the path's own motion, the arm moves at Γ(θ(t)) + δ(t): the rate ρ = dθ/dt falls at the
+/// constant rate β, and the deviation at the beginning fades as e^{−ωt} (e + (ė + ωe) t).
+class PathStop {
+ public:
+  explicit PathStop(Eigen::Index dof);
+
+  /// θ and ρ.
+  using Place = timing::TimedPath::Place;
+  /// What bounds the braking.
+  struct Bounds {
+    const Eigen::VectorXd& effort_max;  ///< that a stop may use [Nm or N]; of size zero: none
+    double rate_max;                    ///< of ρ [1/s]
+  };
+  /// Sets the motion; the path must stay.
+  /// @param e, e_rate deviation of the arm from the path in position and velocity
+  void set(const CertifiedPath& path, const Place& from, const Eigen::VectorXd& e,
+           const Eigen::VectorXd& e_rate, const Bounds& bounds);
+  void at(double time_s, Eigen::VectorXd& q, Eigen::VectorXd& v) const;
+  /// The same without the deviation, with the acceleration.
+  void path_at(double time_s, Eigen::VectorXd& q, Eigen::VectorXd& v, Eigen::VectorXd& a) const;
+
+  [[nodiscard]] const CertifiedPath* path() const noexcept { return path_; }
+  [[nodiscard]] const Eigen::VectorXd& end() const noexcept { return end_; }
+  [[nodiscard]] double duration_s() const noexcept { return duration_s_; }
+  /// The time after which ρ is zero.
+  [[nodiscard]] double braking_s() const noexcept { return braking_s_; }
+  /// β [1/s].
+  [[nodiscard]] double braking_rate() const noexcept { return beta_; }
+  /// Bound of |δ| per joint, at all times.
+  [[nodiscard]] const Eigen::VectorXd& widest() const noexcept { return widest_; }
+  /// Bound of the acceleration by which the deviation fades, the largest of all joints.
+  [[nodiscard]] double fade_acceleration() const noexcept { return fade_acceleration_; }
+  /// The first and the last interval that it passes.
+  [[nodiscard]] Eigen::Index first() const noexcept { return first_; }
+  [[nodiscard]] Eigen::Index last() const noexcept { return last_; }
+  static constexpr double fade_rate = 25.0;  ///< ω [1/s]
+
+ private:
+  /// θ and ρ at a time, where the rate falls at β.
+  [[nodiscard]] Place place_at(double time_s, double beta) const;
+  /// The largest β up to one that torques allow on all intervals that are passed.
+  [[nodiscard]] double allowed(double beta) const;
+  [[nodiscard]] double allowed_at(Eigen::Index node, double rate, double u) const;
+
+  const CertifiedPath* path_ = nullptr;
+  Place from_;
+  double beta_ = 0.0, braking_s_ = 0.0, duration_s_ = 0.0, fade_acceleration_ = 0.0;
+  Eigen::VectorXd e_, slope_, widest_, end_, effort_;
+  mutable Eigen::VectorXd v_, a_;
+  mutable timing::TimedPath::Cursor cursor_;
+  Eigen::Index first_ = 0, last_ = 0;
+};
+
+}  // namespace hamelin::control

@@ -1,0 +1,96 @@
+#include "shield/path_proof.hpp"
+
+#include <algorithm>
+
+namespace hamelin::control {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr Index intervals_max = 4096;
+// The shares of a margin that are asked for, one after the other.
+constexpr double less = 0.5, least_share = 0.2;
+
+}  // namespace
+
+PathProof::PathProof(const model::Model& model, const scene::Levers& levers,
+                     const scene::SelfField* self)
+    : levers_(levers), lines_(model, self), kept_(VectorXd::Ones(intervals_max)) {
+  for (auto* x : {&q0_, &q1_, &v_, &a_, &bend_}) x->setZero(model.dof());
+}
+
+void PathProof::set(const CertifiedPath* path) {
+  path_ = path != nullptr && path->clearance_m.size() <= intervals_max ? path : nullptr;
+  first_ = 0;
+  end_ = path_ != nullptr ? path_->clearance_m.size() : 0;
+  again_ = blocked_ = open_ = false;
+  kept_.setOnes();
+}
+
+void PathProof::forget(const scene::Environment& environment, double time_s, Index first) {
+  if (path_ == nullptr) return;
+  lines_.set_environment(environment, time_s, false);
+  first_ = end_ = first;
+  again_ = true;
+  blocked_ = open_ = false;
+  share_ = 1.0;
+}
+
+// An interval is proved by its chord, with what the curve strays from it.
+void PathProof::begin() {
+  const timing::TimedPath& motion = path_->motion;
+  timing::TimedPath::Cursor cursor;
+  cursor.node = end_;
+  const double from = motion.place[end_], to = motion.place[end_ + 1];
+  const Index piece = motion.curve.at(0.5 * (from + to), q0_, v_, a_);
+  motion.curve.bound_bend(piece, from, to, bend_);
+  motion.curve.at(from, q0_, v_, a_);
+  motion.curve.at(to, q1_, v_, a_);
+  bend_ *= 0.125 * (to - from) * (to - from);
+  double stray = 0.0;
+  for (const Eigen::MatrixXd* levers : {&levers_.shapes(), &levers_.pairs()})
+    for (Index s = 0; s < levers->rows(); ++s)
+      stray = std::max(stray, levers->row(s).dot(bend_));
+  search::Margins margins(share_ * path_->clearance_m[end_] + stray);
+  margins.set_self_most(share_ * path_->self_m[end_] + stray);
+  lines_.set_margins(margins);
+  lines_.begin_motion(q0_, q1_);
+  open_ = true;
+}
+
+void PathProof::advance(long checks) {
+  if (path_ == nullptr || !again_ || blocked_) return;
+  const long since = lines_.checks();
+  for (long rest = checks; rest > 0 && end_ < path_->clearance_m.size();
+       rest = checks - (lines_.checks() - since)) {
+    if (!open_) begin();
+    const std::optional<bool> clear = lines_.prove(rest);
+    if (!clear) return;
+    open_ = false;
+    if (*clear) {
+      kept_[end_++] = share_;
+      share_ = 1.0;
+    } else if ((share_ *= less) < least_share) {
+      blocked_ = true;
+      return;
+    }
+  }
+}
+
+double PathProof::clearance_m(Index first, Index last) const {
+  double least = path_->clearance_m[first] * kept_[first];
+  for (Index k = first + 1; k <= last; ++k)
+    least = std::min(least, path_->clearance_m[k] * kept_[k]);
+  return least;
+}
+
+double PathProof::self_m(Index first, Index last) const {
+  double least = path_->self_m[first] * kept_[first];
+  for (Index k = first + 1; k <= last; ++k)
+    least = std::min(least, path_->self_m[k] * kept_[k]);
+  return least;
+}
+
+}  // namespace hamelin::control

@@ -1,0 +1,85 @@
+// A shield's stops along a certified path: docs/theory.md (14.30)–(14.35).
+#include <algorithm>
+#include <cmath>
+
+#include "shield/shield.hpp"
+
+namespace hamelin::control {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+// The largest acceleration with which a deviation may fade [rad/s² or m/s²].
+constexpr double fade_acceleration_max = 20.0;
+// The same as the straight stop's shortest, in periods.
+constexpr double stop_periods = 4.0;
+
+}  // namespace
+
+void Shield::set_path(const CertifiedPath* path, const Surroundings& world) {
+  path_proof_.set(path);
+  path_cursor_ = {};
+  path_place_ = {};
+  if (path != nullptr && path->snapshot != world.snapshot)
+    path_proof_.forget(world.environment, world.time_s, 0);
+}
+
+PathStop::Place Shield::project(const Node& node, const PathStop::Place& near) {
+  const PathStop::Place at = path_proof_.path()->motion.project(node.q, node.v, near, path_cursor_,
+                                                                path_q_, path_v_, path_a_);
+  e_ = node.q - path_q_;
+  e_rate_ = node.v - at.rate * path_v_;
+  return at;
+}
+
+// docs/theory.md (14.34): no distance is computed, as the path was proved and the arm is near it.
+bool Shield::verify_path(const Step& step) {
+  const PathStop::Place from = project(step.from, path_place_);
+  way_ = e_.cwiseAbs();
+  const double bend = 0.125 * period_s_ * period_s_ * path_a_.lpNorm<Eigen::Infinity>();
+  const Index first = path_cursor_.node;
+  const PathStop::Place to =
+      project(step.to, {from.time_s + period_s_ * from.rate, path_place_.rate});
+  tried_.set_path_stop(*path_proof_.path(), to, e_, e_rate_,
+                       {path_effort_, to.rate / (stop_periods * period_s_)});
+  const PathStop& stop = tried_.path_stop();
+  refusal_ = {StopCause::torque, {}, -1};
+  if (stop.fade_acceleration() > fade_acceleration_max) return false;
+  if (!path_proof_.covers(first, stop.last())) return false;
+  straying_.bound(stop);
+  // the step itself, between its ends
+  way_ = way_.cwiseMax(stop.widest()) - stop.widest() +
+         0.25 * period_s_ * (step.to.v - step.departure).cwiseAbs();
+  way_.array() += bend;
+  straying_.add_tracking(way_);
+  return within_tube(straying_.bounds(), first, stop.last());
+}
+
+bool Shield::within_tube(const Straying::Bounds& stray, Index first, Index last) {
+  const CertifiedPath& path = *path_proof_.path();
+  if (path.room.size() > 0)
+    for (Index k = first; k <= last; ++k)
+      for (Index j = 0; j < stray.tracking.size(); ++j)
+        if (stray.tracking[j] + stray.errors[j] > path.room(j, k)) {
+          refusal_ = {StopCause::joint_limit, {}, static_cast<int>(j)};
+          return false;
+        }
+  double most = 0.0, pairs = 0.0, addition = 0.0;
+  for (Index s = 0; s < levers_.shapes().rows(); ++s) {
+    const double shape = stray.shapes.size() > 0 ? stray.shapes[s] : 0.0;
+    most = std::max(most, levers_.shapes().row(s).dot(stray.tracking) + shape);
+    addition = std::max(addition, shape);
+  }
+  for (Index p = 0; p < levers_.pairs().rows(); ++p)
+    pairs = std::max(pairs, levers_.pairs().row(p).dot(stray.tracking));
+  if (most + margin_m_ < path_proof_.clearance_m(first, last) &&
+      (levers_.pairs().rows() == 0 ||
+       pairs + 2.0 * addition + margin_m_ < path_proof_.self_m(first, last)))
+    return true;
+  refusal_ = {StopCause::map, {0, scene::Contact::map, -1, 0.0}, -1};
+  return false;
+}
+
+}  // namespace hamelin::control

@@ -1,0 +1,49 @@
+#pragma once
+#include <Eigen/Core>
+
+#include "hamelin/scene/joint_trajectory.hpp"
+
+namespace hamelin::timing {
+
+/// A curve in joint space: polynomials of one degree, at most five, in the parameter σ, one after
+/// the other. Positions and tangents agree where two pieces meet, and so does q″ unless the curve
+/// was made of something that jumps there.
+class Curve {
+ public:
+  static constexpr int degree_max = 5;
+
+  Curve() = default;
+  /// An empty curve, to which pieces are appended. @param degree from 1 to 5
+  Curve(Eigen::Index dof, int degree);
+  /// The motion of a trajectory; its parameter is the time [s], docs/theory.md (18.14), (18.15).
+  explicit Curve(const scene::JointTrajectory& trajectory);
+
+  /// Appends a piece. @param coefficients dof × (degree + 1): of (σ − its beginning)^k
+  void add(double length, const Eigen::MatrixXd& coefficients);
+
+  [[nodiscard]] Eigen::Index dof() const noexcept { return coefficients_.rows(); }
+  [[nodiscard]] Eigen::Index pieces() const noexcept { return pieces_; }
+  [[nodiscard]] int degree() const noexcept { return degree_; }
+  /// Where a piece begins; at(pieces()) is where the last one ends.
+  [[nodiscard]] double knot(Eigen::Index k) const { return knots_[k]; }
+  [[nodiscard]] double end() const { return knots_[pieces_]; }
+  /// Position and its first and second derivative by σ, which is clamped to the curve. No
+  /// allocation if the vectors have dof numbers.
+  /// @param first a piece that does not begin after σ @return the piece
+  Eigen::Index at(double s, Eigen::VectorXd& q, Eigen::VectorXd& dq, Eigen::VectorXd& ddq,
+                  Eigen::Index first = 0) const;
+  /// Bounds |q″| of each joint between two places of one piece.
+  void bound_bend(Eigen::Index piece, double from, double to, Eigen::VectorXd& bend) const;
+
+ private:
+  [[nodiscard]] const double* coefficient(Eigen::Index piece, int power) const {
+    return coefficients_.data() + (piece * (degree_ + 1) + power) * dof();
+  }
+
+  int degree_ = 1;
+  Eigen::Index pieces_ = 0;
+  Eigen::VectorXd knots_ = Eigen::VectorXd::Zero(1);
+  Eigen::MatrixXd coefficients_;  ///< dof × (degree + 1) pieces, by powers within a piece
+};
+
+}  // namespace hamelin::timing

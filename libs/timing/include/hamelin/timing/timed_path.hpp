@@ -1,0 +1,49 @@
+#pragma once
+#include <Eigen/Core>
+
+#include "hamelin/scene/joint_trajectory.hpp"
+#include "hamelin/timing/curve.hpp"
+
+namespace hamelin::timing {
+
+/// A motion along a curve: σ(t) has a constant second derivative between nodes,
+/// docs/theory.md (19.5). It ends at rest.
+struct TimedPath {
+  Curve curve;
+  Eigen::VectorXd place;   ///< σ of each node
+  Eigen::VectorXd time_s;  ///< t of each node, from 0
+  Eigen::VectorXd speed;   ///< dσ/dt there
+  Eigen::VectorXd rate;    ///< d²σ/dt² behind each node but the last
+  /// Torques that move the arm along the curve are inertia · d²σ/dt² + bias · (dσ/dt)² + gravity:
+  /// M q′, M q″ + C(q, q′) q′ and ∂U at each node, dof × nodes [Nm or N].
+  Eigen::MatrixXd inertia, bias, gravity;
+  Eigen::MatrixXd tangent, curvature;  ///< q′ and q″ at each node, dof × nodes
+
+  [[nodiscard]] bool empty() const noexcept { return place.size() == 0; }
+  [[nodiscard]] Eigen::Index nodes() const noexcept { return place.size(); }
+  [[nodiscard]] double duration_s() const { return time_s[nodes() - 1]; }
+  /// Where a motion is.
+  struct Cursor {
+    Eigen::Index node = 0, piece = 0;  ///< the last ones that it passed
+  };
+  /// Position, velocity and acceleration at a time, which is clamped to the motion. No allocation
+  /// if the vectors have dof numbers.
+  /// @param cursor of the same or an earlier time; moved on
+  void at(double t, Eigen::VectorXd& q, Eigen::VectorXd& v, Eigen::VectorXd& a,
+          Cursor& cursor) const;
+  /// A place on the motion, and the rate at which it is passed, as a share of its own.
+  struct Place {
+    double time_s = 0.0, rate = 1.0;
+  };
+  /// The place nearest to a state, by one Gauss–Newton step from another one; where the motion is
+  /// slow, that one. Sets the position and velocity there to q and v, at full rate.
+  [[nodiscard]] Place project(const Eigen::VectorXd& q_arm, const Eigen::VectorXd& v_arm,
+                              const Place& near, Cursor& cursor, Eigen::VectorXd& q,
+                              Eigen::VectorXd& v, Eigen::VectorXd& a) const;
+  /// The first time at which it has come so far along the curve.
+  [[nodiscard]] double time_at(double place) const;
+  /// The motion at times that are at most `spacing_s` apart.
+  [[nodiscard]] scene::JointTrajectory sampled(double spacing_s) const;
+};
+
+}  // namespace hamelin::timing

@@ -1,0 +1,95 @@
+#include "hamelin/timing/curve.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hamelin::timing {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+Curve::Curve(Index dof, int degree) : degree_(degree), coefficients_(dof, 0) {}
+
+// docs/theory.md (18.14), (18.15), by powers of the time.
+Curve::Curve(const scene::JointTrajectory& trajectory)
+    : Curve(trajectory.q.rows(), trajectory.a.cols() > 0 ? 5 : 3) {
+  MatrixXd c(dof(), degree_ + 1);
+  for (Index i = 0; i + 1 < trajectory.points(); ++i) {
+    const double h = trajectory.time_s[i + 1] - trajectory.time_s[i];
+    const VectorXd c1 = h * trajectory.v.col(i), dv = h * trajectory.v.col(i + 1) - c1;
+    VectorXd dq = trajectory.q.col(i + 1) - trajectory.q.col(i) - c1;
+    c.col(0) = trajectory.q.col(i);
+    c.col(1) = c1 / h;
+    if (degree_ == 5) {
+      const VectorXd c2 = 0.5 * h * h * trajectory.a.col(i), slope = dv - 2.0 * c2,
+                     bend = 0.5 * h * h * (trajectory.a.col(i + 1) - trajectory.a.col(i));
+      dq -= c2;
+      c.col(2) = c2 / (h * h);
+      c.col(3) = (10.0 * dq - 4.0 * slope + bend) / (h * h * h);
+      c.col(4) = (-15.0 * dq + 7.0 * slope - 2.0 * bend) / (h * h * h * h);
+      c.col(5) = (6.0 * dq - 3.0 * slope + bend) / (h * h * h * h * h);
+    } else {
+      c.col(2) = (3.0 * dq - dv) / (h * h);
+      c.col(3) = (dv - 2.0 * dq) / (h * h * h);
+    }
+    add(h, c);
+  }
+}
+
+void Curve::add(double length, const MatrixXd& coefficients) {
+  const Index columns = degree_ + 1;
+  coefficients_.conservativeResize(Eigen::NoChange, (pieces_ + 1) * columns);
+  coefficients_.rightCols(columns) = coefficients;
+  ++pieces_;
+  knots_.conservativeResize(pieces_ + 1);
+  knots_[pieces_] = knots_[pieces_ - 1] + length;
+}
+
+Index Curve::at(double s, VectorXd& q, VectorXd& dq, VectorXd& ddq, Index first) const {
+  s = std::clamp(s, 0.0, end());
+  const double *const knots = knots_.data(), *const last = knots + pieces_,
+                      *const next = std::upper_bound(knots + std::min(first, pieces_ - 1) + 1,
+                                                     last, s);
+  const Index piece = std::min(next - knots, pieces_) - 1;
+  const double x = s - knots_[piece];
+  const Index n = dof();
+  const double* c = coefficient(piece, degree_);
+  for (Index j = 0; j < n; ++j) {
+    q[j] = c[j];
+    dq[j] = ddq[j] = 0.0;
+  }
+  for (int k = degree_ - 1; k >= 0; --k) {  // Horner's rule, for all three
+    c = coefficient(piece, k);
+    for (Index j = 0; j < n; ++j) {
+      ddq[j] = ddq[j] * x + dq[j];
+      dq[j] = dq[j] * x + q[j];
+      q[j] = q[j] * x + c[j];
+    }
+  }
+  ddq *= 2.0;
+  return piece;
+}
+
+// The second derivative is a polynomial of degree three at most: it is within the hull of its
+// Bernstein coefficients.
+void Curve::bound_bend(Index piece, double from, double to, VectorXd& bend) const {
+  const double a = from - knots_[piece], h = to - from;
+  const auto second = [&](Index j, double x, double& value, double& slope) {
+    value = slope = 0.0;
+    for (int k = degree_; k >= 2; --k) {
+      const double c = coefficient(piece, k)[j] * k * (k - 1);
+      slope = slope * x + value;
+      value = value * x + c;
+    }
+  };
+  for (Index j = 0; j < dof(); ++j) {
+    double f0 = 0.0, g0 = 0.0, f1 = 0.0, g1 = 0.0;
+    second(j, a, f0, g0);
+    second(j, a + h, f1, g1);
+    bend[j] = std::max({std::abs(f0), std::abs(f0 + g0 * h / 3.0), std::abs(f1 - g1 * h / 3.0),
+                        std::abs(f1)});
+  }
+}
+
+}  // namespace hamelin::timing

@@ -1,0 +1,72 @@
+#include "hamelin/timing/timed_path.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hamelin::timing {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+void TimedPath::at(double t, VectorXd& q, VectorXd& v, VectorXd& a, Cursor& cursor) const {
+  t = std::clamp(t, 0.0, duration_s());
+  Index& i = cursor.node;
+  if (time_s[i] > t) i = cursor.piece = 0;
+  const double *const times = time_s.data(), *const last = times + nodes() - 1;
+  i = std::min(std::upper_bound(times + i + 1, last, t) - times, nodes() - 1) - 1;
+  const double dt = t - time_s[i], u = rate[i], w = speed[i] + u * dt;
+  cursor.piece = curve.at(place[i] + dt * (speed[i] + 0.5 * u * dt), q, v, a, cursor.piece);
+  a = w * w * a + u * v;
+  v *= w;
+}
+
+TimedPath::Place TimedPath::project(const VectorXd& q_arm, const VectorXd& v_arm,
+                                    const Place& near, Cursor& cursor, VectorXd& q, VectorXd& v,
+                                    VectorXd& a) const {
+  constexpr double least_speed = 0.2, largest_step_s = 0.02, least_slope = 0.3;
+  Place out{std::clamp(near.time_s, 0.0, duration_s()), near.rate};
+  at(out.time_s, q, v, a, cursor);
+  const double square = v.squaredNorm(), along = v.dot(q_arm) - v.dot(q),
+               slope = square - a.dot(q_arm) + a.dot(q);
+  if (square > least_speed * least_speed && slope > least_slope * square) {
+    out.time_s = std::clamp(
+        out.time_s + std::clamp(along / slope, -largest_step_s, largest_step_s), 0.0,
+        duration_s());
+    at(out.time_s, q, v, a, cursor);
+    out.rate = v_arm.dot(v) / v.squaredNorm();
+  }
+  out.rate = std::clamp(out.rate, 0.0, 1.0);
+  return out;
+}
+
+double TimedPath::time_at(double s) const {
+  const double* const first = place.data();
+  const Index i =
+      std::clamp<Index>(std::lower_bound(first, first + nodes(), s) - first, 1, nodes() - 1) - 1;
+  const double way = std::clamp(s, place[i], place[i + 1]) - place[i],
+               square = speed[i] * speed[i] + 2.0 * rate[i] * way,
+               sum = speed[i] + std::sqrt(std::max(0.0, square));
+  return sum > 0.0 ? std::min(time_s[i + 1], time_s[i] + 2.0 * way / sum) : time_s[i];
+}
+
+scene::JointTrajectory TimedPath::sampled(double spacing_s) const {
+  const double T = duration_s();
+  const auto n = std::max<Index>(2, static_cast<Index>(std::ceil(T / spacing_s)));
+  scene::JointTrajectory out;
+  out.time_s.resize(n + 1);
+  out.q.resize(curve.dof(), n + 1);
+  out.v = out.a = out.q;
+  VectorXd q(curve.dof()), v(curve.dof()), a(curve.dof());
+  Cursor cursor;
+  for (Index k = 0; k <= n; ++k) {
+    out.time_s[k] = T * static_cast<double>(k) / static_cast<double>(n);
+    at(out.time_s[k], q, v, a, cursor);
+    out.q.col(k) = q;
+    out.v.col(k) = v;
+    out.a.col(k) = a;
+  }
+  out.v.col(n).setZero();
+  return out;
+}
+
+}  // namespace hamelin::timing
