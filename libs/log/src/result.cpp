@@ -85,6 +85,7 @@ Json shield(const Result::Shield& s) {
            {"steps", s.steps},
            {"refused", s.refused},
            {"refused_at_rest", s.refused_at_rest},
+           {"along_path", s.along_path},
            {"stops", s.stops},
            {"longest_stop_steps", s.longest_stop_steps},
            {"causes", std::move(causes)},

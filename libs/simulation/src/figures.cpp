@@ -14,6 +14,7 @@ log::Result::Shield shield_figures(const control::ShieldReport& report, double w
   out.steps = counts.steps;
   out.refused = counts.refused;
   out.refused_at_rest = counts.at_rest;
+  out.along_path = counts.along_path;
   out.stops = counts.stops;
   out.longest_stop_steps = counts.longest;
   for (std::size_t i = 0; i < counts.causes.size(); ++i)

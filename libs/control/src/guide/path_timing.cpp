@@ -76,11 +76,14 @@ void PathTiming::set_margins(CertifiedPath& out, const search::Margins& margins)
   const Index n = motion.nodes() - 1;
   out.clearance_m.resize(n);
   out.self_m.resize(n);
-  const double loss = motion.curve.pieces() > 1 ? timing::Blending::loss_m : 0.0;
-  VectorXd from(model_.dof()), to(from), unused(from);
+  VectorXd from(model_.dof()), to(from), unused(from), bend(from);
   motion.curve.at(0.0, from, unused, unused);
   for (Index k = 0; k < n; ++k) {
-    motion.curve.at(motion.place[k + 1], to, unused, unused);
+    const double a = motion.place[k], b = motion.place[k + 1];
+    const Index piece = motion.curve.at(0.5 * (a + b), to, unused, unused);
+    motion.curve.bound_bend(piece, a, b, bend);
+    const double loss = bend.isZero(0.0) ? 0.0 : timing::Blending::loss_m;
+    motion.curve.at(b, to, unused, unused);
     out.clearance_m[k] = margins.least(from, to) - loss;
     out.self_m[k] = std::min(margins.least(from, to), margins.self_most_m()) - loss;
     from.swap(to);

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
+#include <vector>
 
 #include "hamelin/timing/time_law.hpp"
 #include "hamelin/timing/timed_path.hpp"
@@ -50,8 +51,8 @@ class PathStop {
   [[nodiscard]] double duration_s() const noexcept { return duration_s_; }
   /// The time after which ρ is zero.
   [[nodiscard]] double braking_s() const noexcept { return braking_s_; }
-  /// β [1/s].
-  [[nodiscard]] double braking_rate() const noexcept { return beta_; }
+  /// β at the beginning [1/s].
+  [[nodiscard]] double braking_rate() const noexcept { return pieces_.front().braking; }
   /// Bound of |δ| per joint, at all times.
   [[nodiscard]] const Eigen::VectorXd& widest() const noexcept { return widest_; }
   /// Bound of the acceleration by which the deviation fades, the largest of all joints.
@@ -62,15 +63,21 @@ class PathStop {
   static constexpr double fade_rate = 25.0;  ///< ω [1/s]
 
  private:
-  /// θ and ρ at a time, where the rate falls at β.
-  [[nodiscard]] Place place_at(double time_s, double beta) const;
-  /// The largest β up to one that torques allow on all intervals that are passed.
-  [[nodiscard]] double allowed(double beta) const;
-  [[nodiscard]] double allowed_at(Eigen::Index node, double rate, double u) const;
+  void brake(const Place& from);
+  /// From a time on, until the next piece: θ, ρ, and β.
+  struct Piece {
+    double time_s, theta_s, rate, braking;
+  };
+  /// θ and ρ at a time, and β there.
+  [[nodiscard]] Piece place_at(double time_s) const;
+  /// The largest β of an interval that torques allow, where ρ² is that at `theta_s`.
+  [[nodiscard]] double allowed(Eigen::Index interval, double theta_s, double square) const;
+  /// Lowers a bound of β by the torques at a node, ahead by so much.
+  void bound_by(Eigen::Index node, double u, double square, double ahead_s, double& most) const;
 
   const CertifiedPath* path_ = nullptr;
-  Place from_;
-  double beta_ = 0.0, braking_s_ = 0.0, duration_s_ = 0.0, fade_acceleration_ = 0.0;
+  std::vector<Piece> pieces_;
+  double rate_max_ = 0.0, braking_s_ = 0.0, duration_s_ = 0.0, fade_acceleration_ = 0.0;
   Eigen::VectorXd e_, slope_, widest_, end_, effort_;
   mutable Eigen::VectorXd v_, a_;
   mutable timing::TimedPath::Cursor cursor_;

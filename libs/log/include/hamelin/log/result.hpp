@@ -118,6 +118,7 @@ struct Result {
   struct Shield {
     double margin_m = 0.0;  ///< the largest of any shape
     long steps = 0, refused = 0, refused_at_rest = 0;
+    long along_path = 0;  ///< steps accepted with a stop along the path
     long stops = 0, longest_stop_steps = 0;
     std::vector<std::pair<std::string, long>> causes;  ///< of stops, those that occurred
     double strayed_rad = 0.0;    ///< largest deviation of a joint from a stop's motion [rad or m]
