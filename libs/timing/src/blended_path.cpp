@@ -12,7 +12,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double narrower = 0.6;  // factor from one try to the next
+constexpr double next_width = 0.6;  // factor from one try to the next
 constexpr int tries = 6;
 // Chords by which a blend is proved [rad or m]; at least so many.
 constexpr double chord = 0.08;
@@ -36,9 +36,15 @@ VectorXd BlendedPath::turn(Index point) const {
 }
 
 double BlendedPath::room(Index point) const {
-  const double behind = begin_[point + 1] - begin_[point];
   return std::min(begin_[point] - begin_[point - 1] - half_[point - 1],
-                  point + 2 < points_.cols() ? 0.5 * behind : behind);
+                  begin_[point + 1] - begin_[point] - half_[point + 1]);
+}
+
+double BlendedPath::share(Index point) const {
+  const double before = begin_[point] - begin_[point - 1],
+               behind = begin_[point + 1] - begin_[point];
+  return std::min((point > 1 ? 0.5 : 1.0) * before,
+                  (point + 2 < points_.cols() ? 0.5 : 1.0) * behind);
 }
 
 // docs/theory.md (19.1)
@@ -105,17 +111,24 @@ bool Blending::is_clear(const BlendedPath& path, Index point, const search::Marg
 }
 
 void Blending::widen(BlendedPath& path, const search::Margins& margins, search::Query& query,
-                     Index first) {
-  for (Index i = first; i <= path.corners(); ++i) {
-    const double room = path.room(i), cut = reach(path.turn(i).cwiseAbs()) / 6.0,
-                 free = cut > 0.0 ? loss_m / cut : room;  // so narrow that it needs no proof
-    double d = room;
+                     Index first, Index last) {
+  for (Index i = first; i <= last; ++i) {
+    const double cut = reach(path.turn(i).cwiseAbs()) / 6.0, room = path.room(i),
+                 free = std::min(room, cut > 0.0 ? loss_m / cut : room);  // needs no proof
+    double d = std::clamp(path.half_length(i), free, room);
     path.set_half_length(i, d);
     for (int k = 0; k < tries && d > free && !is_clear(path, i, margins, query); ++k) {
-      d *= narrower;
-      if (k + 1 == tries) d = free;
-      path.set_half_length(i, std::min(room, std::max(d, free)));
+      d = k + 1 < tries ? std::max(free, next_width * d) : free;
+      path.set_half_length(i, d);
     }
+  }
+}
+
+void Blending::widen(BlendedPath& path, const search::Margins& margins, search::Query& query) {
+  for (Index i = 1; i <= path.corners(); ++i) {
+    const double behind = path.begin(i + 1) - path.begin(i);
+    path.set_half_length(i, std::min(path.room(i), i < path.corners() ? 0.5 * behind : behind));
+    widen(path, margins, query, i, i);
   }
 }
 

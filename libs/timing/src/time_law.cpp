@@ -17,9 +17,6 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-// Nodes on a piece that bends, and their spacing on others [rad or m].
-constexpr Index nodes_per_bend = 8;
-constexpr double spacing = 0.08;
 // The share of the limits that the nodes use at first: torques rise a little between them.
 constexpr double first_share = 0.995;
 constexpr int solutions_max = 4;
@@ -37,8 +34,8 @@ void check(const VectorXd& limit, const char* name, Index dof, bool optional) {
 
 }  // namespace
 
-TimeLaw::TimeLaw(const model::Model& model, Limits limits)
-    : model_(model), limits_(std::move(limits)), ws_(model) {
+TimeLaw::TimeLaw(const model::Model& model, Limits limits, Grid grid)
+    : model_(model), limits_(std::move(limits)), grid_(grid), ws_(model) {
   check(limits_.velocity, "velocity", model.dof(), true);
   check(limits_.acceleration, "acceleration", model.dof(), false);
   check(limits_.torque, "torque", model.dof(), true);
@@ -57,8 +54,8 @@ void TimeLaw::set_nodes(const Curve& curve) {
     const double from = curve.knot(k), to = curve.knot(k + 1);
     curve.bound_bend(k, from, to, bend);
     const bool straight = bend.isZero(0.0);
-    const auto by_length = static_cast<Index>(std::ceil((to - from) / spacing));
-    add_nodes(from, to, straight ? by_length : std::max(nodes_per_bend, by_length));
+    const auto by_length = static_cast<Index>(std::ceil((to - from) / grid_.spacing));
+    add_nodes(from, to, straight ? by_length : std::max(grid_.nodes_per_bend, by_length));
   }
   places_ = Eigen::Map<const VectorXd>(nodes_.data(), static_cast<Index>(nodes_.size()));
   between_ = 0.5 * (places_.head(places_.size() - 1) + places_.tail(places_.size() - 1));
@@ -76,6 +73,7 @@ void TimeLaw::evaluate(const Curve& curve, const VectorXd& places) {
     dq_.col(i) = dq;
     ddq_.col(i) = ddq;
   }
+  if (limits_.torque.size() == 0 && !keeps_dynamics_) return;
   dynamics::inverse_dynamics(model_, ws_, q_, zero_, zero_, gravity_);
   dynamics::inverse_dynamics(model_, ws_, q_, zero_, dq_, inertia_);
   dynamics::inverse_dynamics(model_, ws_, q_, dq_, ddq_, bias_);
@@ -233,7 +231,15 @@ bool TimeLaw::pass(TimedPath& out, const Start& start, double share) {
   return false;
 }
 
+double TimeLaw::duration_s(const Curve& curve) {
+  set_nodes(curve);
+  keeps_dynamics_ = false;
+  evaluate(curve, places_);
+  return pass(trial_, {}, first_share) ? trial_.duration_s() : infinity;
+}
+
 bool TimeLaw::solve(TimedPath& out, const Start& start) {
+  keeps_dynamics_ = true;
   set_nodes(out.curve);
   evaluate(out.curve, between_);
   std::swap(mid_dq_, dq_);

@@ -1,5 +1,6 @@
 #include "guide/guide_search.hpp"
 
+#include <cstdlib>
 #include <exception>
 #include <memory>
 #include <utility>
@@ -61,17 +62,38 @@ bool GuideSearch::still_clear() {
 }
 
 void GuideSearch::find(GuideAnswer& out) {
-  out.path = search_.search({request_.q,
-                             {request_.goal},
-                             request_.search,
-                             request_.kept.leftCols(request_.kept_count)},
-                            query_);
+  search::Problem problem{request_.q,
+                          {request_.goal},
+                          request_.search,
+                          request_.kept.leftCols(request_.kept_count)};
+  out.path = search_.search(problem, query_);
   out.checks += out.path.checks;
   if (!out.path.found() || !timing_) return;
   const long before = query_.checks() + timing_->checks();
-  out.motion = timing_->make(out.path.points, search_.margins(), query_);
-  if (out.motion) out.motion->snapshot = out.snapshot;
+  timing_->begin(request_.search);
+  timing_->consider(out.path.points, search_.margins(), query_);
+  find_others(problem, out);
+  out.motion = timing_->make(query_);
+  if (out.motion) {
+    out.motion->snapshot = out.snapshot;
+    out.path.points = timing_->points();
+    out.path.length = search::path_length(out.path.points);
+  }
   out.checks += query_.checks() + timing_->checks() - before;
+}
+
+// Other random numbers may lead around the other side of an obstacle.
+void GuideSearch::find_others(search::Problem& problem, const GuideAnswer& out) {
+  static const char* const budget = std::getenv("OTHERS");
+  if (budget == nullptr || out.path.points.cols() == 2) return;
+  const long until = query_.checks() + std::atol(budget);
+  for (std::uint64_t k = 1; query_.checks() < until; ++k) {
+    problem.number = request_.search + (k << 32);
+    search_.begin(problem, query_);
+    if (!search_.advance(until - query_.checks())) return;
+    if (search_.path().found() && search_.path().margin_m >= out.path.margin_m)
+      timing_->consider(search_.path().points, search_.margins(), query_);
+  }
 }
 
 void GuideSearch::answer() {

@@ -69,6 +69,7 @@ class GuideSearch {
   void answer();
   [[nodiscard]] bool still_clear();
   void find(GuideAnswer& out);
+  void find_others(search::Problem& problem, const GuideAnswer& out);
 
   search::Search search_;
   GuideQuery query_;

@@ -1,6 +1,9 @@
 #include "guide/path_timing.hpp"
 
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
 #include <utility>
 
 namespace hamelin::control {
@@ -41,30 +44,54 @@ timing::Limits path_limits(const scene::Scene& scene, const model::Model& model,
 }
 
 PathTiming::PathTiming(const scene::Scene& scene, const model::Model& model,
-                       const scene::SelfField* self, timing::Limits limits)
+                       const scene::SelfField* self, timing::Limits limits,
+                       const search::Settings& settings)
     : model_(model),
       levers_(model, self),
       blending_(levers_),
+      way_points_(model, levers_, limits, settings.q_lower, settings.q_upper),
       law_(model, std::move(limits)),
+      seed_(settings.seed),
       ws_(model) {
   const ModelledLimits modelled = modelled_limits(scene, model.robot());
   q_lower_ = modelled.q_lower;
   q_upper_ = modelled.q_upper;
 }
 
-std::unique_ptr<CertifiedPath> PathTiming::make(const MatrixXd& points,
-                                                const search::Margins& margins,
-                                                search::Query& query) {
+void PathTiming::begin(std::uint64_t number) {
+  rng_ = Rng(seed_ + number);
+  best_.reset();
+}
+
+void PathTiming::consider(const MatrixXd& points, const search::Margins& margins,
+                          search::Query& query) {
   timing::BlendedPath path(points);
   blending_.widen(path, margins, query);
+  const double duration = way_points_.duration_s(path);
+  ++checks_;
+  if (best_ && duration >= best_s_) return;
+  best_s_ = duration;
+  best_ = std::move(path);
+  margins_ = margins;
+}
+
+std::unique_ptr<CertifiedPath> PathTiming::make(search::Query& query) {
+  const char* tries = std::getenv("TRIES");
+  const auto now = [] { timespec t{}; clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t); return 1e3 * double(t.tv_sec) + 1e-6 * double(t.tv_nsec); };
+  const double t0 = now();
+  const long c0 = query.checks();
+  double kin = 0.0;
+  if (tries != nullptr) kin = way_points_.improve(*best_, *margins_, query, rng_, {std::atoi(tries), 100000});
+  const double t1 = now();
   auto out = std::make_unique<CertifiedPath>();
-  out->motion.curve = path.curve();
+  out->motion.curve = best_->curve();
   const bool found = law_.solve(out->motion);
+  if (tries != nullptr) std::fprintf(stderr, "IMPROVE %.3f ms %ld checks kin %.3f law %.3f ms T %.3f nodes %d proved %ld clear %ld kept %ld\n", t1 - t0, query.checks() - c0, kin, now() - t1, found ? out->motion.duration_s() : -1.0, int(out->motion.nodes()), way_points_.proved_, way_points_.clear_, way_points_.kept_);
   cause_ = found ? std::string_view() : law_.cause();
   if (!found) return nullptr;
   out->limits = law_.limits();
   checks_ += out->motion.nodes() / nodes_per_check;
-  set_margins(*out, margins);
+  set_margins(*out, *margins_);
   set_room(*out);
   set_mass(*out);
   return out;

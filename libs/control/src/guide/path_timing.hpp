@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "guide/guide_query.hpp"
@@ -9,6 +10,7 @@
 #include "hamelin/scene/levers.hpp"
 #include "hamelin/timing/blended_path.hpp"
 #include "hamelin/timing/time_law.hpp"
+#include "hamelin/timing/way_points.hpp"
 #include "shield/certified_path.hpp"
 
 namespace hamelin::control {
@@ -23,15 +25,22 @@ namespace hamelin::control {
 class PathTiming {
  public:
   /// @param model kept by reference @param self null if self-collision is not modelled
+  /// @param settings of the search, for the joint limits that way-points keep
   PathTiming(const scene::Scene& scene, const model::Model& model, const scene::SelfField* self,
-             timing::Limits limits);
+             timing::Limits limits, const search::Settings& settings);
 
+  /// Begins with the paths to a goal. @param number of the search, for random numbers
+  void begin(std::uint64_t number);
+  /// Takes a path, if it is the fastest so far.
   /// @param points way-points @param margins that the lines between them are proved to keep
-  /// @param query proves the blends
-  /// @return null if there is no motion; see cause()
-  [[nodiscard]] std::unique_ptr<CertifiedPath> make(const Eigen::MatrixXd& points,
-                                                    const search::Margins& margins,
-                                                    search::Query& query);
+  /// @param query proves the blends; its margins are changed
+  void consider(const Eigen::MatrixXd& points, const search::Margins& margins,
+                search::Query& query);
+  /// Improves the fastest path and makes a motion along it.
+  /// @return null if there is none; see cause()
+  [[nodiscard]] std::unique_ptr<CertifiedPath> make(search::Query& query);
+  /// The way-points of the fastest path.
+  [[nodiscard]] const Eigen::MatrixXd& points() const { return best_->points(); }
   [[nodiscard]] const std::string& cause() const noexcept { return cause_; }
   /// Work beside that of the query, in checks.
   [[nodiscard]] long checks() const noexcept { return checks_; }
@@ -44,7 +53,13 @@ class PathTiming {
   const model::Model& model_;
   scene::Levers levers_;
   timing::Blending blending_;
+  timing::WayPoints way_points_;
   timing::TimeLaw law_;
+  std::uint64_t seed_;
+  Rng rng_{0};
+  std::optional<timing::BlendedPath> best_;
+  std::optional<search::Margins> margins_;
+  double best_s_ = 0.0;
   Eigen::VectorXd q_lower_, q_upper_;
   dynamics::Workspace ws_;
   std::string cause_;

@@ -55,12 +55,13 @@ std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, co
                                                    const ArmSetup& arm) {
   if (!searches_paths(scene, arm.plugin)) return nullptr;
   const LimitReserve reserve = shield ? shield->limit_reserve() : LimitReserve{};
+  const search::Settings settings = guide_settings(scene, model, view, reserve, params);
   std::unique_ptr<PathTiming> timing;
   if (arm.plugin.follows_trajectories())
     timing = std::make_unique<PathTiming>(scene, model, view.self_field(),
-                                          path_limits(scene, model, reserve, params));
+                                          path_limits(scene, model, reserve, params), settings);
   return std::make_unique<GuideSearch>(
-      model, arm.world, view, guide_settings(scene, model, view, reserve, params),
+      model, arm.world, view, settings,
       std::move(timing), static_cast<Eigen::Index>(arm.path_points_max), arm.guide_thread);
 }
 

@@ -22,8 +22,10 @@ class BlendedPath {
   /// Half of the length of the blend around a way-point; zero at the ends of the path.
   [[nodiscard]] double half_length(Eigen::Index point) const { return half_[point]; }
   void set_half_length(Eigen::Index point, double d) { half_[point] = d; }
-  /// The largest that the blends beside it leave, if those behind it are to have as much.
+  /// What the blends beside it leave.
   [[nodiscard]] double room(Eigen::Index point) const;
+  /// A fair share of the lines beside it: half of one that leads to another corner.
+  [[nodiscard]] double share(Eigen::Index point) const;
   /// The difference of the unit vectors along the lines before and behind it.
   [[nodiscard]] Eigen::VectorXd turn(Eigen::Index point) const;
   /// Position on the blend around a way-point. @param x from −half_length to half_length
@@ -43,11 +45,14 @@ class Blending {
   /// @param levers of the model, kept by reference
   explicit Blending(const scene::Levers& levers) : levers_(levers) {}
 
-  /// Sets the half-lengths of all corners from `first` on.
+  /// Sets the half-lengths of the corners from `first` to `last` to what can be proved, beginning
+  /// with what they are.
   /// @param margins that the lines of the path are proved to keep, and the blends will
   /// @param query proves the chords; its margins are changed
   void widen(BlendedPath& path, const search::Margins& margins, search::Query& query,
-             Eigen::Index first = 1);
+             Eigen::Index first, Eigen::Index last);
+  /// The same for all corners, beginning with all that there is room for.
+  void widen(BlendedPath& path, const search::Margins& margins, search::Query& query);
   /// By how much the curve may be nearer to something than the margins, in the worst case [m].
   static constexpr double loss_m = 5e-4;
   [[nodiscard]] long proofs() const noexcept { return proofs_; }

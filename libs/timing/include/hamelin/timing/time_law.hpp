@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "hamelin/dynamics/dynamics.hpp"
@@ -22,9 +23,15 @@ struct Limits {
 /// them. One thread.
 class TimeLaw {
  public:
+  /// How densely a curve is examined.
+  struct Grid {
+    Eigen::Index nodes_per_bend = 8;  ///< intervals of a piece that bends, at least
+    double spacing = 0.08;            ///< of nodes, at most, in units of the curve's parameter
+  };
   /// @param model kept by reference
   /// @throws Error invalid for limits that do not fit the model or are not positive
-  TimeLaw(const model::Model& model, Limits limits);
+  TimeLaw(const model::Model& model, Limits limits, Grid grid);
+  TimeLaw(const model::Model& model, Limits limits) : TimeLaw(model, std::move(limits), Grid()) {}
   /// Deleted: a temporary model is gone before any call could use it.
   TimeLaw(const model::Model&& model, Limits limits) = delete;
 
@@ -37,6 +44,9 @@ class TimeLaw {
   /// @return whether there is a motion; else see cause()
   [[nodiscard]] bool solve(TimedPath& out, const Start& start);
   [[nodiscard]] bool solve(TimedPath& out) { return solve(out, {}); }
+  /// The duration of that motion, from rest and without an examination between the nodes; infinite
+  /// if there is none.
+  [[nodiscard]] double duration_s(const Curve& curve);
   /// One line: why the last call found no motion.
   [[nodiscard]] std::string_view cause() const noexcept { return cause_; }
   [[nodiscard]] const Limits& limits() const noexcept { return limits_; }
@@ -66,6 +76,7 @@ class TimeLaw {
 
   const model::Model& model_;
   Limits limits_;
+  Grid grid_;
   dynamics::BatchWorkspace ws_;
   std::string_view cause_;
   std::vector<double> nodes_;
@@ -73,6 +84,8 @@ class TimeLaw {
   dynamics::StatesXd q_, dq_, ddq_, inertia_, bias_, gravity_, zero_;
   dynamics::StatesXd mid_dq_, mid_ddq_, mid_inertia_, mid_bias_, mid_gravity_;
   std::vector<Line> lines_;
+  bool keeps_dynamics_ = true;  ///< although torques are not limited
+  TimedPath trial_;             ///< of duration_s(), without a curve
 };
 
 }  // namespace hamelin::timing

@@ -1,0 +1,55 @@
+#pragma once
+#include <Eigen/Core>
+
+#include "hamelin/core/rng.hpp"
+#include "hamelin/search/query.hpp"
+#include "hamelin/timing/blended_path.hpp"
+#include "hamelin/timing/time_law.hpp"
+
+namespace hamelin::timing {
+
+/// Moves the way-points of a path so that the motion along it takes less time: docs/theory.md
+/// (19.4). Random changes are kept that shorten the motion and are proved; torques are left out of
+/// that comparison. One thread.
+class WayPoints {
+ public:
+  /// @param model, levers kept by reference
+  /// @param q_lower, q_upper within which way-points are moved; of size zero: no limits
+  WayPoints(const model::Model& model, const scene::Levers& levers, const Limits& limits,
+            Eigen::VectorXd q_lower, Eigen::VectorXd q_upper);
+
+  struct Effort {
+    int tries = 300;       ///< changes that are tried
+    long checks = 100000;  ///< of the query, at most about so many
+  };
+  /// @param path its lines and blends are proved to keep the margins; changed where that helps
+  /// @param query its margins are changed
+  /// @return the duration of the motion, without limits of torques [s]
+  [[nodiscard]] double duration_s(const BlendedPath& path) {
+    return law_.duration_s(path.curve());
+  }
+  double improve(BlendedPath& path, const search::Margins& margins, search::Query& query,
+                 Rng& rng, const Effort& effort);
+
+ private:
+  /// Changes a copy of the points. @return the first and the last line that are new
+  struct Change {
+    Eigen::Index first, last;
+  };
+  [[nodiscard]] Change change(const Eigen::MatrixXd& from, Rng& rng);
+  void keep_limits(Eigen::Index point);
+  void predict(const BlendedPath& now, const Change& changed, BlendedPath& out) const;
+  [[nodiscard]] bool prove(BlendedPath& candidate, const Change& changed,
+                           const search::Margins& margins, search::Query& query);
+ public:
+  long proved_=0, clear_=0, kept_=0;
+ private:
+
+  TimeLaw law_;
+  Blending blending_;
+  Eigen::VectorXd q_lower_, q_upper_;
+  Eigen::MatrixXd trial_;
+  double spread_ = 0.0;
+};
+
+}  // namespace hamelin::timing
