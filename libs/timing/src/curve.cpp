@@ -71,6 +71,21 @@ Index Curve::at(double s, VectorXd& q, VectorXd& dq, VectorXd& ddq, Index first)
   return piece;
 }
 
+bool Curve::is_smooth() const {
+  constexpr double rounding = 1e-6;
+  for (Index k = 0; k + 1 < pieces_; ++k) {
+    const double x = knots_[k + 1] - knots_[k];
+    for (Index j = 0; j < dof(); ++j) {
+      double before = 0.0;
+      for (int power = degree_; power >= 1; --power)
+        before = before * x + power * coefficient(k, power)[j];
+      const double behind = coefficient(k + 1, 1)[j];
+      if (!(std::abs(before - behind) <= rounding * (1.0 + std::abs(before)))) return false;
+    }
+  }
+  return true;
+}
+
 // The second derivative is a polynomial of degree three at most: it is within the hull of its
 // Bernstein coefficients.
 void Curve::bound_bend(Index piece, double from, double to, VectorXd& bend) const {

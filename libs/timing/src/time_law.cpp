@@ -232,6 +232,7 @@ bool TimeLaw::pass(TimedPath& out, const Start& start, double share) {
 }
 
 double TimeLaw::duration_s(const Curve& curve) {
+  if (!curve.is_smooth()) return infinity;
   set_nodes(curve);
   keeps_dynamics_ = false;
   evaluate(curve, places_);
@@ -240,6 +241,10 @@ double TimeLaw::duration_s(const Curve& curve) {
 
 bool TimeLaw::solve(TimedPath& out, const Start& start) {
   keeps_dynamics_ = true;
+  if (!out.curve.is_smooth()) {
+    cause_ = "the path has a corner";
+    return false;
+  }
   set_nodes(out.curve);
   evaluate(out.curve, between_);
   std::swap(mid_dq_, dq_);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <utility>
 
 namespace hamelin::timing {
@@ -14,6 +13,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr TimeLaw::Grid coarse{4, 0.3};
+// Blends that are new are taken to be as wide as there is room for, also beyond the middle of a line.
+constexpr double most_share = 1.6;
 // Proofs of blends begin with so much more than the width that is expected.
 constexpr double more_width = 1.3;
 // What is worth a proof, and what is worth a change, as shares of the duration.
@@ -42,7 +43,7 @@ bool are_apart(const MatrixXd& points) {
 
 WayPoints::WayPoints(const model::Model& model, const scene::Levers& levers, const Limits& limits,
                      VectorXd q_lower, VectorXd q_upper)
-    : law_(model, std::getenv("TQ") ? limits : without_torques(limits), coarse),
+    : law_(model, without_torques(limits), coarse),
       blending_(levers),
       q_lower_(std::move(q_lower)),
       q_upper_(std::move(q_upper)) {}
@@ -60,8 +61,8 @@ void WayPoints::predict(const BlendedPath& now, const Change& changed, BlendedPa
     if (more != 0 && i > changed.first) before = i - more;
     before = std::clamp<Index>(before, 1, now.corners());
     double share = now.half_length(before) / now.share(before);
-    static const double OPT = std::getenv("OPT") ? std::atof(std::getenv("OPT")) : 0.0;
-    if (i >= changed.first && i <= changed.last + 1) share = std::max(share, OPT);
+    // what is new may be clear of what was in the way
+    if (i >= changed.first && i <= changed.last + 1) share = std::max(share, most_share);
     out.set_half_length(i, std::min(out.room(i), share * out.share(i)));
   }
 }
@@ -126,12 +127,9 @@ double WayPoints::improve(BlendedPath& path, const search::Margins& margins,
       spread_ = std::max(least_spread, narrower * spread_);
       continue;
     }
-    ++proved_;
     if (!prove(candidate, changed, margins, query)) continue;
-    ++clear_;
     const double duration = law_.duration_s(candidate.curve());
     if (duration > worth_change * best) continue;
-    ++kept_;
     path = std::move(candidate);
     best = duration;
     spread_ = std::min(most_spread, wider * spread_);

@@ -1,6 +1,5 @@
 #include "guide/guide_search.hpp"
 
-#include <cstdlib>
 #include <exception>
 #include <memory>
 #include <utility>
@@ -9,6 +8,13 @@ namespace hamelin::control {
 
 using Eigen::Index;
 using Eigen::VectorXd;
+
+namespace {
+
+// Checks that are spent on other paths to a goal, of which the fastest is taken.
+constexpr long other_checks = 3000;
+
+}  // namespace
 
 GuideRequest::GuideRequest(Index dof, Index points_max)
     : q(VectorXd::Zero(dof)), kept(Eigen::MatrixXd::Zero(dof, points_max)) {
@@ -84,9 +90,8 @@ void GuideSearch::find(GuideAnswer& out) {
 
 // Other random numbers may lead around the other side of an obstacle.
 void GuideSearch::find_others(search::Problem& problem, const GuideAnswer& out) {
-  static const char* const budget = std::getenv("OTHERS");
-  if (budget == nullptr || out.path.points.cols() == 2) return;
-  const long until = query_.checks() + std::atol(budget);
+  if (out.path.points.cols() == 2) return;
+  const long until = query_.checks() + other_checks;
   for (std::uint64_t k = 1; query_.checks() < until; ++k) {
     problem.number = request_.search + (k << 32);
     search_.begin(problem, query_);

@@ -1,9 +1,6 @@
 #include "guide/path_timing.hpp"
 
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
-#include <ctime>
 #include <utility>
 
 namespace hamelin::control {
@@ -18,6 +15,9 @@ namespace {
 constexpr double speed_share = 0.99, acceleration_share = 14.0 / 15.0, torque_share_most = 0.9,
                  torque_share_kept = 0.04;
 constexpr double default_acceleration = 15.0;  // [rad/s² or m/s²]
+// Changes of way-points that are tried, what each costs besides proofs, and what these may cost.
+constexpr int tries = 200;
+constexpr long checks_per_try = 5, improve_checks = 2000;
 // Nodes of a motion that cost as much as a check.
 constexpr Index nodes_per_check = 4;
 // The mass matrix is evaluated at so many places, and may be larger between them.
@@ -76,17 +76,11 @@ void PathTiming::consider(const MatrixXd& points, const search::Margins& margins
 }
 
 std::unique_ptr<CertifiedPath> PathTiming::make(search::Query& query) {
-  const char* tries = std::getenv("TRIES");
-  const auto now = [] { timespec t{}; clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t); return 1e3 * double(t.tv_sec) + 1e-6 * double(t.tv_nsec); };
-  const double t0 = now();
-  const long c0 = query.checks();
-  double kin = 0.0;
-  if (tries != nullptr) kin = way_points_.improve(*best_, *margins_, query, rng_, {std::atoi(tries), 100000});
-  const double t1 = now();
+  checks_ += checks_per_try * tries;
+  (void)way_points_.improve(*best_, *margins_, query, rng_, {tries, improve_checks});
   auto out = std::make_unique<CertifiedPath>();
   out->motion.curve = best_->curve();
   const bool found = law_.solve(out->motion);
-  if (tries != nullptr) std::fprintf(stderr, "IMPROVE %.3f ms %ld checks kin %.3f law %.3f ms T %.3f nodes %d proved %ld clear %ld kept %ld\n", t1 - t0, query.checks() - c0, kin, now() - t1, found ? out->motion.duration_s() : -1.0, int(out->motion.nodes()), way_points_.proved_, way_points_.clear_, way_points_.kept_);
   cause_ = found ? std::string_view() : law_.cause();
   if (!found) return nullptr;
   out->limits = law_.limits();

@@ -1,8 +1,6 @@
 // A shield's stops along a certified path: docs/theory.md (14.30)–(14.35).
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 #include "shield/shield.hpp"
 
@@ -48,9 +46,7 @@ bool Shield::verify_path(const Step& step) {
                        {path_effort_, to.rate / (stop_periods * period_s_)});
   const PathStop& stop = tried_.path_stop();
   refusal_ = {StopCause::torque, {}, -1};
-  if (std::getenv("DBG") != nullptr && stop.fade_acceleration() > fade_acceleration_max) std::fprintf(stderr, "T %.4f rho %.4f e %.3f ev %.4f fade %.1f\n", to.time_s, to.rate, 1e3*e_.lpNorm<Eigen::Infinity>(), e_rate_.lpNorm<Eigen::Infinity>(), stop.fade_acceleration());
   if (stop.fade_acceleration() > fade_acceleration_max) return false;
-  if (std::getenv("DBG") != nullptr && !path_proof_.covers(first, stop.last())) std::fprintf(stderr, "not covered\n");
   if (!path_proof_.covers(first, stop.last())) return false;
   straying_.bound(stop);
   // the step itself, between its ends
@@ -58,10 +54,7 @@ bool Shield::verify_path(const Step& step) {
          0.25 * period_s_ * (step.to.v - step.departure).cwiseAbs();
   way_.array() += bend;
   straying_.add_tracking(way_);
-  const bool ok = within_tube(straying_.bounds(), first, stop.last());
-  if (std::getenv("DBG") != nullptr)
-    std::fprintf(stderr, "T %.4f rho %.4f e %.3f mrad ev %.4f fade %.2f beta %.2f bs %.3f wid %.3f clr %.4f self %.4f %s\n", to.time_s, to.rate, 1e3 * e_.lpNorm<Eigen::Infinity>(), e_rate_.lpNorm<Eigen::Infinity>(), stop.fade_acceleration(), stop.braking_rate(), stop.braking_s(), 1e3 * stop.widest().maxCoeff(), path_proof_.clearance_m(first, stop.last()), path_proof_.self_m(first, stop.last()), ok ? "ok" : "OFF");
-  return ok;
+  return within_tube(straying_.bounds(), first, stop.last());
 }
 
 bool Shield::within_tube(const Straying::Bounds& stray, Index first, Index last) {

@@ -32,6 +32,8 @@ class Curve {
   /// @param first a piece that does not begin after σ @return the piece
   Eigen::Index at(double s, Eigen::VectorXd& q, Eigen::VectorXd& dq, Eigen::VectorXd& ddq,
                   Eigen::Index first = 0) const;
+  /// Whether the tangent is the same on both sides of all places where pieces meet, to rounding.
+  [[nodiscard]] bool is_smooth() const;
   /// Bounds |q″| of each joint between two places of one piece.
   void bound_bend(Eigen::Index piece, double from, double to, Eigen::VectorXd& bend) const;
 

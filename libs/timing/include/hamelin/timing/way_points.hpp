@@ -25,6 +25,7 @@ class WayPoints {
   /// @param path its lines and blends are proved to keep the margins; changed where that helps
   /// @param query its margins are changed
   /// @return the duration of the motion, without limits of torques [s]
+  /// The duration of a motion along a path, without limits of torques [s].
   [[nodiscard]] double duration_s(const BlendedPath& path) {
     return law_.duration_s(path.curve());
   }
@@ -41,9 +42,6 @@ class WayPoints {
   void predict(const BlendedPath& now, const Change& changed, BlendedPath& out) const;
   [[nodiscard]] bool prove(BlendedPath& candidate, const Change& changed,
                            const search::Margins& margins, search::Query& query);
- public:
-  long proved_=0, clear_=0, kept_=0;
- private:
 
   TimeLaw law_;
   Blending blending_;
