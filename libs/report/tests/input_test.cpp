@@ -48,7 +48,9 @@ TEST_CASE("a file that is not a log is refused in one line with its name", "[rep
   std::string damaged = text;
   damaged.replace(damaged.find("\"q\":[", header), 5, "\"q\":[1.0,");
   std::string backwards = text;
-  backwards.replace(backwards.find("\"k\":3"), 5, "\"k\":1");
+  const std::size_t third = backwards.find("\"k\":3");
+  backwards.replace(third, 5, "\"k\":1");
+  const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(third), '\n');
   const std::pair<std::string, std::string> cases[] = {
       {"", "is empty"},
       {text.substr(0, 100), "has no complete line"},
@@ -57,7 +59,7 @@ TEST_CASE("a file that is not a log is refused in one line with its name", "[rep
       {"{\"schema\": \"hamelin.scene/1\"}\n", "its first line is not a header"},
       {text.substr(header), "its first line is not a header"},
       {damaged, "line 2: q: expected 7 numbers"},
-      {backwards, "line 6: k: 1 after 2"},
+      {backwards, "line " + std::to_string(line) + ": k: 1 after 2"},
       {text + text.substr(header), "follows the result"},
       {text.substr(0, header) + "{\"type\":\"tock\"}\n", "line 2: type \"tock\""},
       {text.substr(0, header) + "{\"type\":\"tick\",\"k\":0,\"time_s\":\"now\"}\n",

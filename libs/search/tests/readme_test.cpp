@@ -3,7 +3,7 @@
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/search/search.hpp"
 #include "hamelin/test/readme.hpp"
-#include "joint_space_world.hpp"
+#include "hamelin/test/joint_space_world.hpp"
 
 using namespace hamelin;
 

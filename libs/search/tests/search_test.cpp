@@ -12,7 +12,7 @@
 #include "hamelin/search/margins.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/errors.hpp"
-#include "joint_space_world.hpp"
+#include "hamelin/test/joint_space_world.hpp"
 
 using namespace hamelin;
 using Eigen::Index;

@@ -140,7 +140,7 @@ double TimeLaw::largest(double x_max) const {
   return x;
 }
 
-// The largest squared speeds from which rest can be reached.
+// docs/theory.md (19.7): the largest squared speeds from which rest can be reached.
 bool TimeLaw::backward(const Start& start, double share) {
   const Index n = places_.size();
   squared_max_ = VectorXd::Constant(n, squared_speed_max);
@@ -191,7 +191,7 @@ bool TimeLaw::forward(TimedPath& out, const Start& start, double share) {
   return true;
 }
 
-// docs/theory.md (19.8): at the middle of each interval, with what a parabola through three points
+// docs/theory.md (19.9): at the middle of each interval, with what a parabola through three points
 // may rise between them.
 double TimeLaw::excess(const TimedPath& motion) {
   double most = 0.0;

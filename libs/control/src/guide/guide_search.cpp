@@ -9,13 +9,6 @@ namespace hamelin::control {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-namespace {
-
-// Checks that are spent on other paths to a goal, of which the fastest is taken.
-constexpr long other_checks = 3000;
-
-}  // namespace
-
 GuideRequest::GuideRequest(Index dof, Index points_max)
     : q(VectorXd::Zero(dof)), kept(Eigen::MatrixXd::Zero(dof, points_max)) {
   goal.q = q;
@@ -23,10 +16,11 @@ GuideRequest::GuideRequest(Index dof, Index points_max)
 
 GuideSearch::GuideSearch(const model::Model& model, const World& world, const WorldView& view,
                          search::Settings settings, std::unique_ptr<PathTiming> timing,
-                         Index points_max, bool threaded)
+                         long other_checks, Index points_max, bool threaded)
     : search_(model, std::move(settings)),
       query_(model, world, view),
       timing_(std::move(timing)),
+      other_checks_(other_checks),
       request_(model.dof(), points_max),
       answers_(std::make_unique<GuideAnswer>()) {
   if (threaded) thread_ = std::thread([this] { work(); });
@@ -91,7 +85,7 @@ void GuideSearch::find(GuideAnswer& out) {
 // Other random numbers may lead around the other side of an obstacle.
 void GuideSearch::find_others(search::Problem& problem, const GuideAnswer& out) {
   if (out.path.points.cols() == 2) return;
-  const long until = query_.checks() + other_checks;
+  const long until = query_.checks() + other_checks_;
   for (std::uint64_t k = 1; query_.checks() < until; ++k) {
     problem.number = request_.search + (k << 32);
     search_.begin(problem, query_);

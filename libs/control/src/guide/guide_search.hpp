@@ -43,11 +43,12 @@ class GuideSearch {
  public:
   /// @param points_max as for GuideRequest
   /// @param timing null: no motions along paths are made
+  /// @param other_checks that are spent on other paths to a goal, of which the fastest is taken
   /// @param threaded whether it has a thread of its own; else run() does the work
   /// model, world and view must outlive this
   GuideSearch(const model::Model& model, const World& world, const WorldView& view,
               search::Settings settings, std::unique_ptr<PathTiming> timing,
-              Eigen::Index points_max, bool threaded);
+              long other_checks, Eigen::Index points_max, bool threaded);
   GuideSearch(const GuideSearch&) = delete;
   GuideSearch& operator=(const GuideSearch&) = delete;
   ~GuideSearch();
@@ -74,6 +75,7 @@ class GuideSearch {
   search::Search search_;
   GuideQuery query_;
   std::unique_ptr<PathTiming> timing_;
+  long other_checks_;
   GuideRequest request_;
   Newest<GuideAnswer> answers_;
   std::atomic<State> state_{State::idle};

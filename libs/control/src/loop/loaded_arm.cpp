@@ -1,6 +1,7 @@
 #include "loop/loaded_arm.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,18 +52,30 @@ bool searches_paths(const scene::Scene& scene, const planning::Plugin& plugin) n
          (scene.guide.type == scene::GuideType::on_request && plugin.asks_for_paths());
 }
 
+namespace {
+
+// While the arm waits for them, other paths must not cost more time than they save.
+long other_checks(const scene::GuideSpec& spec) {
+  constexpr double most_s = 0.006, most = 3000.0;
+  return std::lround(spec.check_time_s * most > most_s ? most_s / spec.check_time_s : most);
+}
+
+}  // namespace
+
 std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, const Json& params,
                                                    const ArmSetup& arm) {
   if (!searches_paths(scene, arm.plugin)) return nullptr;
   const LimitReserve reserve = shield ? shield->limit_reserve() : LimitReserve{};
   const search::Settings settings = guide_settings(scene, model, view, reserve, params);
   std::unique_ptr<PathTiming> timing;
-  if (arm.plugin.follows_trajectories())
+  const ChangeBounds changes = arm.drive.changes(scene);
+  const bool sudden = changes.torque_rate == 0.0 && changes.jerk_max.size() == 0;
+  if (sudden && arm.plugin.follows_trajectories())
     timing = std::make_unique<PathTiming>(scene, model, view.self_field(),
                                           path_limits(scene, model, reserve, params), settings);
   return std::make_unique<GuideSearch>(
       model, arm.world, view, settings,
-      std::move(timing), static_cast<Eigen::Index>(arm.path_points_max), arm.guide_thread);
+      std::move(timing), other_checks(scene.guide), static_cast<Eigen::Index>(arm.path_points_max), arm.guide_thread);
 }
 
 planning::SetupData LoadedArm::make_setup(const scene::Scene& scene, const ArmSetup& arm) {

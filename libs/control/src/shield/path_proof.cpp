@@ -38,7 +38,7 @@ void PathProof::forget(const scene::Environment& environment, double time_s, Ind
   share_ = 1.0;
 }
 
-// An interval is proved by its chord, with what the curve strays from it.
+// docs/theory.md (14.35): an interval is proved by its chord, with what the curve strays from it.
 void PathProof::begin() {
   const timing::TimedPath& motion = path_->motion;
   timing::TimedPath::Cursor cursor;

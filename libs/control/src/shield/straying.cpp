@@ -128,7 +128,8 @@ void Straying::bound(const PathStop& stop) {
     torque_ = torque_.cwiseMax(velocity_.cwiseAbs());
     bias_ = bias_.cwiseMax(acceleration_.cwiseAbs());
   }
-  begin(torque_, between_examined * bias_);
+  bias_ *= between_examined;
+  begin(torque_, bias_);
   bounds_.tracking += stop.widest();
   if (has_model_errors()) {
     for (const double share : {0.0, 0.5, 0.9}) {

@@ -7,7 +7,7 @@
 
 namespace hamelin::timing {
 
-/// Way-points joined by straight lines, with a blend around each corner, docs/theory.md (19.1): a
+/// Way-points joined by straight lines, with a blend around each corner, docs/theory.md (19.1), (19.2): a
 /// curve with continuous tangent and curvature, by arc length but for the blends.
 class BlendedPath {
  public:

@@ -15,7 +15,7 @@ struct TimedPath {
   Eigen::VectorXd speed;   ///< dσ/dt there
   Eigen::VectorXd rate;    ///< d²σ/dt² behind each node but the last
   /// Torques that move the arm along the curve are inertia · d²σ/dt² + bias · (dσ/dt)² + gravity:
-  /// M q′, M q″ + C(q, q′) q′ and ∂U at each node, dof × nodes [Nm or N].
+  /// M q′, M q″ + C(q, q′) q′ and ∂U at each node, dof × nodes [Nm or N]; docs/theory.md (19.4).
   Eigen::MatrixXd inertia, bias, gravity;
   Eigen::MatrixXd tangent, curvature;  ///< q′ and q″ at each node, dof × nodes
 

@@ -8,8 +8,8 @@
 
 namespace hamelin::timing {
 
-/// Moves the way-points of a path so that the motion along it takes less time: docs/theory.md
-/// (19.4). Random changes are kept that shorten the motion and are proved; torques are left out of
+/// Moves the way-points of a path so that the motion along it takes less time:
+/// chapter 19 of docs/theory.md. Random changes are kept that shorten the motion and are proved; torques are left out of
 /// that comparison. One thread.
 class WayPoints {
  public:

@@ -18,6 +18,8 @@ class JointSpaceWorld final : public search::Query {
   };
   explicit JointSpaceWorld(std::vector<Ball> balls) : balls_(std::move(balls)) {}
 
+  void set_balls(std::vector<Ball> balls) { balls_ = std::move(balls); }
+
   double clearance(const Eigen::VectorXd& q, double) override {
     ++checks_;
     return distance(q, q);
