@@ -71,6 +71,11 @@ bool Guidance::request() {
   return true;
 }
 
+void Guidance::give_up_path() noexcept {
+  mode_ = Mode::unguided;
+  ++number_;
+}
+
 void Guidance::ask(const Now& now, GuideSearch& search) {
   GuideRequest& request = search.request();
   request.number = ++asked_;

@@ -43,6 +43,8 @@ class Guidance {
   News update(const Now& now, GuideSearch& search);
   /// The planner asks for a path. @return whether one will be searched
   [[nodiscard]] bool request();
+  /// The path leads nowhere: the planner is shown the goal itself.
+  void give_up_path() noexcept;
   /// The arm does not make progress. @return whether there will be another search, if there was one
   /// at this goal
   [[nodiscard]] bool stalled() { return mode_ != Mode::off && request(); }

@@ -18,6 +18,8 @@ constexpr double default_acceleration = 15.0;  // [rad/s² or m/s²]
 // Changes of way-points that are tried, what each costs besides proofs, and what these may cost.
 constexpr int tries = 200;
 constexpr long checks_per_try = 5, improve_checks = 2000;
+// Intervals that keep less are examined again [m].
+constexpr double enough_m = 0.004;
 // Nodes of a motion that cost as much as a check.
 constexpr Index nodes_per_check = 4;
 // The mass matrix is evaluated at so many places, and may be larger between them.
@@ -86,6 +88,7 @@ std::unique_ptr<CertifiedPath> PathTiming::make(search::Query& query) {
   out->limits = law_.limits();
   checks_ += out->motion.nodes() / nodes_per_check;
   set_margins(*out, *margins_);
+  raise_margins(*out, query);
   set_room(*out);
   set_mass(*out);
   return out;
@@ -108,6 +111,31 @@ void PathTiming::set_margins(CertifiedPath& out, const search::Margins& margins)
     out.clearance_m[k] = margins.least(from, to) - loss;
     out.self_m[k] = std::min(margins.least(from, to), margins.self_most_m()) - loss;
     from.swap(to);
+  }
+}
+
+void PathTiming::raise_margins(CertifiedPath& out, search::Query& query) const {
+  const timing::TimedPath& motion = out.motion;
+  VectorXd from(model_.dof()), to(from), unused(from), bend(from);
+  for (Index k = 0; k + 1 < motion.nodes(); ++k) {
+    if (std::min(out.clearance_m[k], out.self_m[k]) >= enough_m) continue;
+    const double a = motion.place[k], b = motion.place[k + 1];
+    const Index piece = motion.curve.at(0.5 * (a + b), from, to, unused);
+    motion.curve.bound_bend(piece, a, b, bend);
+    if (!bend.isZero(0.0)) continue;
+    motion.curve.at(a, from, unused, unused);
+    motion.curve.at(b, to, unused, unused);
+    for (const double factor : {4.0, 2.5, 1.6}) {
+      const double clearance = std::max(out.clearance_m[k], std::min(enough_m, factor * out.clearance_m[k])),
+                   self = std::max(out.self_m[k], std::min(enough_m, factor * out.self_m[k]));
+      search::Margins margins(clearance);
+      margins.set_self_most(self);
+      query.set_margins(margins);
+      if (!query.motion_clear(from, to)) continue;
+      out.clearance_m[k] = clearance;
+      out.self_m[k] = std::min(self, clearance);
+      break;
+    }
   }
 }
 

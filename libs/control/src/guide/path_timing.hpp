@@ -47,6 +47,8 @@ class PathTiming {
 
  private:
   void set_margins(CertifiedPath& out, const search::Margins& margins) const;
+  /// Near a tight start or goal paths are proved with less than there is.
+  void raise_margins(CertifiedPath& out, search::Query& query) const;
   void set_room(CertifiedPath& out) const;
   void set_mass(CertifiedPath& out);
 

@@ -21,6 +21,8 @@ using Eigen::VectorXd;
 
 namespace {
 
+// After so long at rest on its path another one is asked for [s].
+constexpr double longest_held_s = 0.1;
 // Beyond these bounds the surroundings are not known, or memory would be missing.
 void check_size(std::span<const scene::Payload> payloads, const model::Model& loaded,
                 const World& world) {
@@ -361,6 +363,12 @@ void Controller::update_path() {
     shield->note_path(path_reference_->next(
         static_cast<double>(drive_options_->delay_periods) * period_s_));
   if (!state.ended && state.rate > 0.0) goals_.forget_rest();
+  // an arm that may not go on from where it rests needs another path
+  const bool held = answer_.stopping && arm_->stop().at_rest();
+  held_s_ = held ? held_s_ + period_s_ : 0.0;
+  if (held_s_ < longest_held_s) return;
+  held_s_ = 0.0;
+  if (!guidance_->request()) guidance_->give_up_path();
 }
 
 void Controller::take_params() {

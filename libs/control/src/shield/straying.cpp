@@ -70,6 +70,7 @@ Straying::Straying(const scene::Scene& scene, const model::Model& model,
     : model_(model),
       levers_(levers),
       period_s_(period_s),
+      feedback_rate_(feedback_rate),
       limits_rate_(torque_rate > 0.0),
       mass_error_(scene.safety.mass_error),
       noise_(noise_deviations * scene::safety_bounds(scene).joint_noise_rad),
@@ -129,7 +130,12 @@ void Straying::bound(const PathStop& stop) {
     bias_ = bias_.cwiseMax(acceleration_.cwiseAbs());
   }
   bias_ *= between_examined;
+  // a velocity that lags by half a period acts like a disturbance: docs/theory.md (14.36)
+  const double lag_s2 = lag_s_ > 0.0 ? period_s_ / feedback_rate_ : 0.0;
+  velocity_ = (lag_s_ * torque_).cwiseMin(lag_s2 * bias_);
+  torque_.setZero();
   begin(torque_, bias_);
+  bounds_.tracking += velocity_;
   bounds_.tracking += stop.widest();
   if (has_model_errors()) {
     for (const double share : {0.0, 0.5, 0.9}) {

@@ -87,7 +87,7 @@ class Straying {
 
   const model::Model& model_;
   const scene::Levers& levers_;
-  double period_s_;
+  double period_s_, feedback_rate_;
   bool limits_rate_;          ///< whether torques change at a bounded rate
   double mass_error_;         ///< bound of unexplained torques as a share of the model's own
   Eigen::VectorXd friction_;  ///< bound of unexplained friction of each joint [Nm or N]

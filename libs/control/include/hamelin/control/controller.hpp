@@ -347,6 +347,7 @@ class Controller {
   LiveTarget target_;
   LiveReference reference_;
   std::unique_ptr<PathReference> path_reference_;
+  double held_s_ = 0.0;  ///< for which the arm was not allowed to leave its place on the path
   const hamelin_goal* listed_ = nullptr;  ///< the goal of the last tick in its list
   hamelin_goal live_goal_{};              ///< the current one if it changes from tick to tick
   std::uint64_t used_params_ = 0;
