@@ -1,6 +1,7 @@
 #include "guide/path_timing.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace hamelin::control {
@@ -20,6 +21,8 @@ constexpr int tries = 200;
 constexpr long checks_per_try = 5, improve_checks = 2000;
 // Intervals that keep less are examined again [m].
 constexpr double enough_m = 0.004;
+// Factors of such a margin that are tried.
+constexpr std::array<double, 3> higher{4.0, 2.5, 1.6};
 // Nodes of a motion that cost as much as a check.
 constexpr Index nodes_per_check = 4;
 // The mass matrix is evaluated at so many places, and may be larger between them.
@@ -122,14 +125,14 @@ void PathTiming::raise_margins(CertifiedPath& out, search::Query& query) const {
     const double a = motion.place[k], b = motion.place[k + 1];
     const Index piece = motion.curve.at(0.5 * (a + b), from, to, unused);
     motion.curve.bound_bend(piece, a, b, bend);
-    if (!bend.isZero(0.0)) continue;
+    const double stray = blending_.reach(0.125 * (b - a) * (b - a) * bend);
     motion.curve.at(a, from, unused, unused);
     motion.curve.at(b, to, unused, unused);
-    for (const double factor : {4.0, 2.5, 1.6}) {
-      const double clearance = std::max(out.clearance_m[k], std::min(enough_m, factor * out.clearance_m[k])),
-                   self = std::max(out.self_m[k], std::min(enough_m, factor * out.self_m[k]));
-      search::Margins margins(clearance);
-      margins.set_self_most(self);
+    for (const double factor : higher) {
+      const auto raised = [&](double m) { return std::max(m, std::min(enough_m, factor * m)); };
+      const double clearance = raised(out.clearance_m[k]), self = raised(out.self_m[k]);
+      search::Margins margins(clearance + stray);
+      margins.set_self_most(self + stray);
       query.set_margins(margins);
       if (!query.motion_clear(from, to)) continue;
       out.clearance_m[k] = clearance;
