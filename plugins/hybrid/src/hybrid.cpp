@@ -154,6 +154,7 @@ class Hybrid final : public planning::Planner {
     double gain = target.via != nullptr ? follow_gain_ : velocity_gain_,
            acceleration = drive_acceleration_;
     if ((follows() && mode_ == Mode::goal) || tracks_) gain = target_velocity_gain_;
+    if (certified_) gain = certified_gain();
     if (tracks_) acceleration = acceleration_max_;
     if (evader_.evades()) gain = evasion_gain, acceleration = evasion_acceleration;
     // A reference accelerates as the motors can, so the velocity that counts is the present one.
@@ -261,13 +262,20 @@ class Hybrid final : public planning::Planner {
            (reference->q - drive_.q()).lpNorm<Eigen::Infinity>() < track_within;
   }
 
+  // As the feedback of a stop, whose bounds are those of the tube: docs/theory.md (14.14).
+  [[nodiscard]] double certified_gain() const {
+    constexpr double feedback_rate = 50.0, per_step = 0.2;
+    return 2.0 * std::min(feedback_rate, per_step / setup_.control_period_s());
+  }
+
   // docs/theory.md (18.17)
   void track(const planning::Tick& tick) {
     const auto reference = *tick.reference();
     // Under ideal actuation v is that of the step before, on average half a period old.
+    const double gain = certified_ ? certified_gain() : target_velocity_gain_;
     const double lead =
-        1.0 / target_velocity_gain_ - (setup_.sampled() ? 0.0 : 0.5 * setup_.control_period_s());
-    u_ = reference.v + lead * reference.a + tracking_gain_ * (reference.q - drive_.q());
+        1.0 / gain - (setup_.sampled() ? 0.0 : 0.5 * setup_.control_period_s());
+    u_ = reference.v + lead * reference.a + (certified_ ? 0.25 * gain : tracking_gain_) * (reference.q - drive_.q());
     if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
   }
 
