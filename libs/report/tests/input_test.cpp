@@ -50,7 +50,8 @@ TEST_CASE("a file that is not a log is refused in one line with its name", "[rep
   std::string backwards = text;
   const std::size_t third = backwards.find("\"k\":3");
   backwards.replace(third, 5, "\"k\":1");
-  const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(third), '\n');
+  const auto line =
+      1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(third), '\n');
   const std::pair<std::string, std::string> cases[] = {
       {"", "is empty"},
       {text.substr(0, 100), "has no complete line"},

@@ -41,8 +41,7 @@ EdgeCheck::EdgeCheck(const model::Model& model, const scene::SelfField* self)
   pair_way_ = VectorXd::Zero(levers_.pairs().rows());
 }
 
-void EdgeCheck::set_environment(const scene::Environment& environment, double time_s,
-                                bool movers) {
+void EdgeCheck::set_environment(const scene::Environment& environment, double time_s, bool movers) {
   environment_ = &environment;
   time_s_ = time_s;
   obstacles_ = environment.has_obstacles();

@@ -268,8 +268,7 @@ LineCheck::LineCheck(LineCheck&&) noexcept = default;
 LineCheck& LineCheck::operator=(LineCheck&&) noexcept = default;
 LineCheck::~LineCheck() = default;
 
-void LineCheck::set_environment(const scene::Environment& environment, double time_s,
-                                bool movers) {
+void LineCheck::set_environment(const scene::Environment& environment, double time_s, bool movers) {
   impl_->set_environment(environment, time_s, movers);
 }
 void LineCheck::set_margins(const Margins& margins) {

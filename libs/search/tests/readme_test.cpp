@@ -2,8 +2,8 @@
 
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/search/search.hpp"
-#include "hamelin/test/readme.hpp"
 #include "hamelin/test/joint_space_world.hpp"
+#include "hamelin/test/readme.hpp"
 
 using namespace hamelin;
 

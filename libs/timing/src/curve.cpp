@@ -49,8 +49,8 @@ void Curve::add(double length, const MatrixXd& coefficients) {
 Index Curve::at(double s, VectorXd& q, VectorXd& dq, VectorXd& ddq, Index first) const {
   s = std::clamp(s, 0.0, end());
   const double *const knots = knots_.data(), *const last = knots + pieces_,
-                      *const next = std::upper_bound(knots + std::min(first, pieces_ - 1) + 1,
-                                                     last, s);
+                      *const next =
+                          std::upper_bound(knots + std::min(first, pieces_ - 1) + 1, last, s);
   const Index piece = std::min(next - knots, pieces_) - 1;
   const double x = s - knots_[piece];
   const Index n = dof();
@@ -102,8 +102,8 @@ void Curve::bound_bend(Index piece, double from, double to, VectorXd& bend) cons
     double f0 = 0.0, g0 = 0.0, f1 = 0.0, g1 = 0.0;
     second(j, a, f0, g0);
     second(j, a + h, f1, g1);
-    bend[j] = std::max({std::abs(f0), std::abs(f0 + g0 * h / 3.0), std::abs(f1 - g1 * h / 3.0),
-                        std::abs(f1)});
+    bend[j] = std::max(
+        {std::abs(f0), std::abs(f0 + g0 * h / 3.0), std::abs(f1 - g1 * h / 3.0), std::abs(f1)});
   }
 }
 

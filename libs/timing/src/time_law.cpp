@@ -27,9 +27,9 @@ constexpr double squared_speed_max = 1e8;
 void check(const VectorXd& limit, const char* name, Index dof, bool optional) {
   if (optional && limit.size() == 0) return;
   if (limit.size() != dof || !(limit.array() > 0.0).all())
-    throw Error(ErrorCode::invalid,
-                fmt::format("time law: {}: expected {} positive numbers (one per joint)", name,
-                            dof));
+    throw Error(
+        ErrorCode::invalid,
+        fmt::format("time law: {}: expected {} positive numbers (one per joint)", name, dof));
 }
 
 }  // namespace
@@ -133,7 +133,8 @@ double TimeLaw::largest(double x_max) const {
     if (at.low <= at.high || low == nullptr || high == nullptr) return x;
     const double fall = high->slope - low->slope;  // of the width, by x
     const double next = (high->high - low->low) / fall;
-    if (!(fall > 0.0) || !(next < x)) return x <= 0.0 ? -1.0 : std::max(0.0, std::nextafter(x, 0.0));
+    if (!(fall > 0.0) || !(next < x))
+      return x <= 0.0 ? -1.0 : std::max(0.0, std::nextafter(x, 0.0));
     x = next;
     if (x < 0.0) return -1.0;
   }
@@ -204,14 +205,14 @@ double TimeLaw::excess(const TimedPath& motion) {
     const double u = motion.rate[i], x0 = motion.speed[i] * motion.speed[i],
                  x2 = motion.speed[i + 1] * motion.speed[i + 1], x1 = 0.5 * (x0 + x2);
     for (Index j = 0; j < model_.dof(); ++j) {
-      const double a = rise(dq_(j, i) * u + ddq_(j, i) * x0, mid_dq_(j, i) * u + mid_ddq_(j, i) * x1,
-                            dq_(j, i + 1) * u + ddq_(j, i + 1) * x2);
+      const double a =
+          rise(dq_(j, i) * u + ddq_(j, i) * x0, mid_dq_(j, i) * u + mid_ddq_(j, i) * x1,
+               dq_(j, i + 1) * u + ddq_(j, i + 1) * x2);
       most = std::max(most, a / limits_.acceleration[j]);
       if (limits_.torque.size() > 0) {
-        const double t =
-            rise(inertia_(j, i) * u + bias_(j, i) * x0 + gravity_(j, i),
-                 mid_inertia_(j, i) * u + mid_bias_(j, i) * x1 + mid_gravity_(j, i),
-                 inertia_(j, i + 1) * u + bias_(j, i + 1) * x2 + gravity_(j, i + 1));
+        const double t = rise(inertia_(j, i) * u + bias_(j, i) * x0 + gravity_(j, i),
+                              mid_inertia_(j, i) * u + mid_bias_(j, i) * x1 + mid_gravity_(j, i),
+                              inertia_(j, i + 1) * u + bias_(j, i + 1) * x2 + gravity_(j, i + 1));
         most = std::max(most, t / limits_.torque[j]);
       }
       if (limits_.velocity.size() > 0)

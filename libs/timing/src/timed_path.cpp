@@ -20,18 +20,16 @@ void TimedPath::at(double t, VectorXd& q, VectorXd& v, VectorXd& a, Cursor& curs
   v *= w;
 }
 
-TimedPath::Place TimedPath::project(const VectorXd& q_arm, const VectorXd& v_arm,
-                                    const Place& near, Cursor& cursor, VectorXd& q, VectorXd& v,
-                                    VectorXd& a) const {
+TimedPath::Place TimedPath::project(const VectorXd& q_arm, const VectorXd& v_arm, const Place& near,
+                                    Cursor& cursor, VectorXd& q, VectorXd& v, VectorXd& a) const {
   constexpr double least_speed = 0.2, largest_step_s = 0.02, least_slope = 0.3;
   Place out{std::clamp(near.time_s, 0.0, duration_s()), near.rate};
   at(out.time_s, q, v, a, cursor);
   const double square = v.squaredNorm(), along = v.dot(q_arm) - v.dot(q),
                slope = square - a.dot(q_arm) + a.dot(q);
   if (square > least_speed * least_speed && slope > least_slope * square) {
-    out.time_s = std::clamp(
-        out.time_s + std::clamp(along / slope, -largest_step_s, largest_step_s), 0.0,
-        duration_s());
+    out.time_s = std::clamp(out.time_s + std::clamp(along / slope, -largest_step_s, largest_step_s),
+                            0.0, duration_s());
     at(out.time_s, q, v, a, cursor);
     out.rate = v_arm.dot(v) / v.squaredNorm();
   }

@@ -13,7 +13,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr TimeLaw::Grid coarse{4, 0.3};
-// Blends that are new are taken to be as wide as there is room for, also beyond the middle of a line.
+// Blends that are new are taken to be as wide as there is room for, also beyond the middle of a
+// line.
 constexpr double most_share = 1.6;
 // Proofs of blends begin with so much more than the width that is expected.
 constexpr double more_width = 1.3;
@@ -68,7 +69,8 @@ void WayPoints::predict(const BlendedPath& now, const Change& changed, BlendedPa
 }
 
 WayPoints::Change WayPoints::change(const MatrixXd& from, Rng& rng) {
-  const Index n = from.cols(), inner = 1 + static_cast<Index>(rng.below(static_cast<std::uint64_t>(n - 2)));
+  const Index n = from.cols(),
+              inner = 1 + static_cast<Index>(rng.below(static_cast<std::uint64_t>(n - 2)));
   const double kind = rng.uniform();
   trial_ = from;
   if (kind < removals && n > 3) {
@@ -81,8 +83,7 @@ WayPoints::Change WayPoints::change(const MatrixXd& from, Rng& rng) {
     trial_.resize(from.rows(), n + 1);
     trial_ << from.leftCols(line + 1), 0.5 * (from.col(line) + from.col(line + 1)),
         from.rightCols(n - 1 - line);
-    for (Index j = 0; j < trial_.rows(); ++j)
-      trial_(j, line + 1) += 0.3 * spread_ * rng.normal();
+    for (Index j = 0; j < trial_.rows(); ++j) trial_(j, line + 1) += 0.3 * spread_ * rng.normal();
     keep_limits(line + 1);
     return {line, line + 1};
   }
@@ -99,22 +100,23 @@ WayPoints::Change WayPoints::change(const MatrixXd& from, Rng& rng) {
 
 // The lines that are new, and then the blends at their ends, each beginning with a little more than
 // its width is now.
-bool WayPoints::prove(BlendedPath& candidate, const Change& changed,
-                      const search::Margins& margins, search::Query& query) {
+bool WayPoints::prove(BlendedPath& candidate, const Change& changed, const search::Margins& margins,
+                      search::Query& query) {
   query.set_margins(margins);
   for (Index line = changed.first; line <= changed.last; ++line)
     if (!query.motion_clear(trial_.col(line), trial_.col(line + 1))) return false;
   const Index first = std::max<Index>(1, changed.first),
               last = std::min(candidate.corners(), changed.last + 1);
   for (Index i = first; i <= last; ++i) {
-    candidate.set_half_length(i, std::min(candidate.room(i), more_width * candidate.half_length(i)));
+    candidate.set_half_length(i,
+                              std::min(candidate.room(i), more_width * candidate.half_length(i)));
     blending_.widen(candidate, margins, query, i, i);
   }
   return true;
 }
 
-double WayPoints::improve(BlendedPath& path, const search::Margins& margins,
-                          search::Query& query, Rng& rng, const Effort& effort) {
+double WayPoints::improve(BlendedPath& path, const search::Margins& margins, search::Query& query,
+                          Rng& rng, const Effort& effort) {
   double best = law_.duration_s(path.curve());
   const long until = query.checks() + effort.checks;
   spread_ = first_spread;

@@ -257,8 +257,7 @@ class Hybrid final : public planning::Planner {
   [[nodiscard]] bool tracks(const planning::Tick& tick) const {
     const auto reference = tick.reference();
     return reference && (reference->certified || reference->rate > track_rate_least) &&
-           mode_ == Mode::goal &&
-           !evader_.evades() &&
+           mode_ == Mode::goal && !evader_.evades() &&
            (reference->q - drive_.q()).lpNorm<Eigen::Infinity>() < track_within;
   }
 
@@ -273,9 +272,9 @@ class Hybrid final : public planning::Planner {
     const auto reference = *tick.reference();
     // Under ideal actuation v is that of the step before, on average half a period old.
     const double gain = certified_ ? certified_gain() : target_velocity_gain_;
-    const double lead =
-        1.0 / gain - (setup_.sampled() ? 0.0 : 0.5 * setup_.control_period_s());
-    u_ = reference.v + lead * reference.a + (certified_ ? 0.25 * gain : tracking_gain_) * (reference.q - drive_.q());
+    const double lead = 1.0 / gain - (setup_.sampled() ? 0.0 : 0.5 * setup_.control_period_s());
+    u_ = reference.v + lead * reference.a +
+         (certified_ ? 0.25 * gain : tracking_gain_) * (reference.q - drive_.q());
     if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
   }
 

@@ -62,10 +62,8 @@ bool GuideSearch::still_clear() {
 }
 
 void GuideSearch::find(GuideAnswer& out) {
-  search::Problem problem{request_.q,
-                          {request_.goal},
-                          request_.search,
-                          request_.kept.leftCols(request_.kept_count)};
+  search::Problem problem{
+      request_.q, {request_.goal}, request_.search, request_.kept.leftCols(request_.kept_count)};
   out.path = search_.search(problem, query_);
   out.checks += out.path.checks;
   if (!out.path.found() || !timing_) return;

@@ -47,8 +47,8 @@ class GuideSearch {
   /// @param threaded whether it has a thread of its own; else run() does the work
   /// model, world and view must outlive this
   GuideSearch(const model::Model& model, const World& world, const WorldView& view,
-              search::Settings settings, std::unique_ptr<PathTiming> timing,
-              long other_checks, Eigen::Index points_max, bool threaded);
+              search::Settings settings, std::unique_ptr<PathTiming> timing, long other_checks,
+              Eigen::Index points_max, bool threaded);
   GuideSearch(const GuideSearch&) = delete;
   GuideSearch& operator=(const GuideSearch&) = delete;
   ~GuideSearch();

@@ -16,9 +16,10 @@ namespace {
 constexpr double speed_share = 0.99, acceleration_share = 14.0 / 15.0, torque_share_most = 0.9,
                  torque_share_kept = 0.04;
 constexpr double default_acceleration = 15.0;  // [rad/s² or m/s²]
-// Changes of way-points that are tried, what each costs besides proofs, and what these may cost.
-constexpr int tries = 200;
-constexpr long checks_per_try = 5, improve_checks = 2000;
+// Changes of way-points that are tried, what each costs besides proofs in checks, and what these
+// may cost; fewer where checks take longer than so [s]: the arm waits for them.
+constexpr double tries_max = 200.0, improve_checks = 2000.0, usual_check_s = 2e-6;
+constexpr long checks_per_try = 5;
 // Intervals that keep less are examined again [m].
 constexpr double enough_m = 0.004;
 // Factors of such a margin that are tried.
@@ -39,8 +40,8 @@ timing::Limits path_limits(const scene::Scene& scene, const model::Model& model,
   if (reserve.velocity.size() == out.velocity.size()) out.velocity -= reserve.velocity;
   out.velocity *= speed_share;
   const auto found = params.find("acceleration_max");
-  const double most = found != params.end() && found->is_number() ? found->get<double>()
-                                                                   : default_acceleration;
+  const double most =
+      found != params.end() && found->is_number() ? found->get<double>() : default_acceleration;
   out.acceleration = VectorXd::Constant(model.dof(), acceleration_share * most);
   const double share =
       std::min(torque_share_most, scene::safety_bounds(scene).torque_share - torque_share_kept);
@@ -59,6 +60,8 @@ PathTiming::PathTiming(const scene::Scene& scene, const model::Model& model,
       seed_(settings.seed),
       ws_(model) {
   const ModelledLimits modelled = modelled_limits(scene, model.robot());
+  const double share = usual_check_s / std::max(usual_check_s, scene.guide.check_time_s);
+  effort_ = {static_cast<int>(tries_max * share), static_cast<long>(improve_checks * share)};
   q_lower_ = modelled.q_lower;
   q_upper_ = modelled.q_upper;
 }
@@ -81,8 +84,8 @@ void PathTiming::consider(const MatrixXd& points, const search::Margins& margins
 }
 
 std::unique_ptr<CertifiedPath> PathTiming::make(search::Query& query) {
-  checks_ += checks_per_try * tries;
-  (void)way_points_.improve(*best_, *margins_, query, rng_, {tries, improve_checks});
+  checks_ += checks_per_try * effort_.tries;
+  (void)way_points_.improve(*best_, *margins_, query, rng_, effort_);
   auto out = std::make_unique<CertifiedPath>();
   out->motion.curve = best_->curve();
   const bool found = law_.solve(out->motion);

@@ -57,6 +57,7 @@ class PathTiming {
   timing::Blending blending_;
   timing::WayPoints way_points_;
   timing::TimeLaw law_;
+  timing::WayPoints::Effort effort_;
   std::uint64_t seed_;
   Rng rng_{0};
   std::optional<timing::BlendedPath> best_;

@@ -353,15 +353,17 @@ const CertifiedPath* Controller::path_in_force() const noexcept {
 void Controller::update_path() {
   const CertifiedPath* const path = guidance_ ? guidance_->motion() : nullptr;
   Shield* const shield = arm_->shield.get();
-  if (path != path_reference_->path()) path != nullptr ? path_reference_->start(*path) : path_reference_->stop();
-  if (shield != nullptr && shield->path_proof().path() != path) shield->set_path(path, surroundings());
+  if (path != path_reference_->path())
+    path != nullptr ? path_reference_->start(*path) : path_reference_->stop();
+  if (shield != nullptr && shield->path_proof().path() != path)
+    shield->set_path(path, surroundings());
   if (path == nullptr) return;
   const ReferenceState& state =
       path_reference_->update({period_s_, q(), v(), answer_.stopping, arm_->view.speed_scale()});
   answer_.reference = &state;
   if (shield != nullptr)
-    shield->note_path(path_reference_->next(
-        static_cast<double>(drive_options_->delay_periods) * period_s_));
+    shield->note_path(
+        path_reference_->next(static_cast<double>(drive_options_->delay_periods) * period_s_));
   if (!state.ended && state.rate > 0.0) goals_.forget_rest();
   // an arm that may not go on from where it rests needs another path
   const bool held = answer_.stopping && arm_->stop().at_rest();

@@ -74,8 +74,8 @@ std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, co
     timing = std::make_unique<PathTiming>(scene, model, view.self_field(),
                                           path_limits(scene, model, reserve, params), settings);
   return std::make_unique<GuideSearch>(
-      model, arm.world, view, settings,
-      std::move(timing), other_checks(scene.guide), static_cast<Eigen::Index>(arm.path_points_max), arm.guide_thread);
+      model, arm.world, view, settings, std::move(timing), other_checks(scene.guide),
+      static_cast<Eigen::Index>(arm.path_points_max), arm.guide_thread);
 }
 
 planning::SetupData LoadedArm::make_setup(const scene::Scene& scene, const ArmSetup& arm) {

@@ -83,8 +83,7 @@ double PathReference::largest_rise(double most) const {
       bound(motion.inertia(j, node), motion.bias(j, node), motion.gravity(j, node),
             limits.torque[j], speed);
     for (Index j = 0; j < limits.acceleration.size(); ++j)
-      bound(motion.tangent(j, node), motion.curvature(j, node), 0.0, limits.acceleration[j],
-            speed);
+      bound(motion.tangent(j, node), motion.curvature(j, node), 0.0, limits.acceleration[j], speed);
   }
   return std::max(0.0, rise_share * most);
 }

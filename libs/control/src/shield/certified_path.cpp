@@ -39,7 +39,8 @@ void PathStop::bound_by(Index node, double u, double square, double ahead_s, dou
   const timing::TimedPath& motion = path_->motion;
   const double speed = motion.speed[node];
   for (Index j = 0; j < effort_.size(); ++j) {
-    const double a = motion.inertia(j, node), dynamic = a * u + motion.bias(j, node) * speed * speed,
+    const double a = motion.inertia(j, node),
+                 dynamic = a * u + motion.bias(j, node) * speed * speed,
                  rest = square * dynamic + motion.gravity(j, node),
                  slope = 2.0 * ahead_s * dynamic + a * speed;
     if (slope > 0.0)
@@ -64,8 +65,7 @@ void PathStop::set(const CertifiedPath& path, const Place& from, const VectorXd&
   e_ = e;
   slope_ = e_rate + fade_rate * e;
   widest_ = e.cwiseAbs() + slope_.cwiseAbs() / (fade_rate * e_number);
-  fade_acceleration_ =
-      fade_rate * (fade_rate * e.cwiseAbs() + 2.0 * e_rate.cwiseAbs()).maxCoeff();
+  fade_acceleration_ = fade_rate * (fade_rate * e.cwiseAbs() + 2.0 * e_rate.cwiseAbs()).maxCoeff();
   effort_ = bounds.effort_max;
   if (effort_.size() > 0) effort_ -= fade_acceleration_ * path.mass;
   rate_max_ = bounds.rate_max;

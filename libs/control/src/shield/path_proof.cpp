@@ -51,8 +51,7 @@ void PathProof::begin() {
   bend_ *= 0.125 * (to - from) * (to - from);
   double stray = 0.0;
   for (const Eigen::MatrixXd* levers : {&levers_.shapes(), &levers_.pairs()})
-    for (Index s = 0; s < levers->rows(); ++s)
-      stray = std::max(stray, levers->row(s).dot(bend_));
+    for (Index s = 0; s < levers->rows(); ++s) stray = std::max(stray, levers->row(s).dot(bend_));
   search::Margins margins(share_ * path_->clearance_m[end_] + stray);
   margins.set_self_most(share_ * path_->self_m[end_] + stray);
   lines_.set_margins(margins);
@@ -88,8 +87,7 @@ double PathProof::clearance_m(Index first, Index last) const {
 
 double PathProof::self_m(Index first, Index last) const {
   double least = path_->self_m[first] * kept_[first];
-  for (Index k = first + 1; k <= last; ++k)
-    least = std::min(least, path_->self_m[k] * kept_[k]);
+  for (Index k = first + 1; k <= last; ++k) least = std::min(least, path_->self_m[k] * kept_[k]);
   return least;
 }
 

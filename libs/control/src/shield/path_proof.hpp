@@ -43,8 +43,8 @@ class PathProof {
   const CertifiedPath* path_ = nullptr;
   Eigen::Index first_ = 0, end_ = 0;
   bool again_ = false, blocked_ = false, open_ = false;
-  double share_ = 1.0;   ///< of the margin that is asked for
-  Eigen::VectorXd kept_; ///< share of the margins that is proved, per interval
+  double share_ = 1.0;    ///< of the margin that is asked for
+  Eigen::VectorXd kept_;  ///< share of the margins that is proved, per interval
   Eigen::VectorXd q0_, q1_, v_, a_, bend_;
 };
 

@@ -98,7 +98,7 @@ struct ShieldCounts {
   long overtaken = 0;
   /// Steps with moving obstacles in reach, by what is proved after them.
   std::array<long, mover_proofs> proofs{};
-  long evasions = 0;  ///< of the stops, those that were followed by a move when they began
+  long evasions = 0;    ///< of the stops, those that were followed by a move when they began
   long along_path = 0;  ///< steps that were accepted with a stop along a path
 };
 

@@ -193,9 +193,9 @@ class Controller {
   /// the state `stopping` and its cause is gone; servos that still move go on from their set point.
   /// Planner, guide and shield are made again, goals go on where they were. If the measurement of
   /// that tick cannot be used, the next one that can is waited for, unless more than
-  /// Options::lost_measurements_max are lost in a row. The arm remains stopped then, and if there is
-  /// no way to stop from where it is, which Answer::cause says. A stop that no answer has shown yet
-  /// remains. Any thread; this takes milliseconds.
+  /// Options::lost_measurements_max are lost in a row. The arm remains stopped then, and if there
+  /// is no way to stop from where it is, which Answer::cause says. A stop that no answer has shown
+  /// yet remains. Any thread; this takes milliseconds.
   /// @throws Error plugin if the planner refuses to start; nothing changes then
   void resume();
 

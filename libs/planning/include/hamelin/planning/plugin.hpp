@@ -215,8 +215,10 @@ class Tick {
     const hamelin_goal& goal = *raw_->goal;
     if (!HAMELIN_HAS_FIELD(&goal, hamelin_goal, reference_rate) || goal.reference_q == nullptr)
       return std::nullopt;
-    return Reference{ConstVectorMap(goal.reference_q, dof_), ConstVectorMap(goal.reference_v, dof_),
-                     ConstVectorMap(goal.reference_a, dof_), goal.reference_time_s,
+    return Reference{ConstVectorMap(goal.reference_q, dof_),
+                     ConstVectorMap(goal.reference_v, dof_),
+                     ConstVectorMap(goal.reference_a, dof_),
+                     goal.reference_time_s,
                      goal.reference_rate,
                      HAMELIN_HAS_FIELD(&goal, hamelin_goal, reference_certified) &&
                          goal.reference_certified != 0};

@@ -7,8 +7,8 @@
 
 namespace hamelin::timing {
 
-/// Way-points joined by straight lines, with a blend around each corner, docs/theory.md (19.1), (19.2): a
-/// curve with continuous tangent and curvature, by arc length but for the blends.
+/// Way-points joined by straight lines, with a blend around each corner, docs/theory.md (19.1),
+/// (19.2): a curve with continuous tangent and curvature, by arc length but for the blends.
 class BlendedPath {
  public:
   /// @param points dof × way-points, at least two, of which no two neighbours are equal

@@ -9,8 +9,8 @@
 namespace hamelin::timing {
 
 /// Moves the way-points of a path so that the motion along it takes less time:
-/// chapter 19 of docs/theory.md. Random changes are kept that shorten the motion and are proved; torques are left out of
-/// that comparison. One thread.
+/// chapter 19 of docs/theory.md. Random changes are kept that shorten the motion and are proved;
+/// torques are left out of that comparison. One thread.
 class WayPoints {
  public:
   /// @param model, levers kept by reference
@@ -26,11 +26,9 @@ class WayPoints {
   /// @param query its margins are changed
   /// @return the duration of the motion, without limits of torques [s]
   /// The duration of a motion along a path, without limits of torques [s].
-  [[nodiscard]] double duration_s(const BlendedPath& path) {
-    return law_.duration_s(path.curve());
-  }
-  double improve(BlendedPath& path, const search::Margins& margins, search::Query& query,
-                 Rng& rng, const Effort& effort);
+  [[nodiscard]] double duration_s(const BlendedPath& path) { return law_.duration_s(path.curve()); }
+  double improve(BlendedPath& path, const search::Margins& margins, search::Query& query, Rng& rng,
+                 const Effort& effort);
 
  private:
   /// Changes a copy of the points. @return the first and the last line that are new
