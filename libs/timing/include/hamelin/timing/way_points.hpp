@@ -22,11 +22,11 @@ class WayPoints {
     int tries = 300;       ///< changes that are tried
     long checks = 100000;  ///< of the query, at most about so many
   };
+  /// The duration of a motion along a path, without limits of torques [s].
+  [[nodiscard]] double duration_s(const BlendedPath& path) { return law_.duration_s(path.curve()); }
   /// @param path its lines and blends are proved to keep the margins; changed where that helps
   /// @param query its margins are changed
   /// @return the duration of the motion, without limits of torques [s]
-  /// The duration of a motion along a path, without limits of torques [s].
-  [[nodiscard]] double duration_s(const BlendedPath& path) { return law_.duration_s(path.curve()); }
   double improve(BlendedPath& path, const search::Margins& margins, search::Query& query, Rng& rng,
                  const Effort& effort);
 
