@@ -94,7 +94,6 @@ double Blending::reach(const VectorXd& deviation) const {
 // What the blend strays from its chords is kept besides the margins.
 bool Blending::is_clear(const BlendedPath& path, Index point, const search::Margins& margins,
                         search::Query& query) {
-  ++proofs_;
   const double d = path.half_length(point);
   const int n = std::max(chords_least, 2 * static_cast<int>(std::ceil(d / chord)));
   const double h = 2.0 * d / n;

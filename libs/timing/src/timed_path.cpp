@@ -37,16 +37,6 @@ TimedPath::Place TimedPath::project(const VectorXd& q_arm, const VectorXd& v_arm
   return out;
 }
 
-double TimedPath::time_at(double s) const {
-  const double* const first = place.data();
-  const Index i =
-      std::clamp<Index>(std::lower_bound(first, first + nodes(), s) - first, 1, nodes() - 1) - 1;
-  const double way = std::clamp(s, place[i], place[i + 1]) - place[i],
-               square = speed[i] * speed[i] + 2.0 * rate[i] * way,
-               sum = speed[i] + std::sqrt(std::max(0.0, square));
-  return sum > 0.0 ? std::min(time_s[i + 1], time_s[i] + 2.0 * way / sum) : time_s[i];
-}
-
 scene::JointTrajectory TimedPath::sampled(double spacing_s) const {
   const double T = duration_s();
   const auto n = std::max<Index>(2, static_cast<Index>(std::ceil(T / spacing_s)));

@@ -6,7 +6,6 @@
 namespace hamelin::control {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {

@@ -41,8 +41,6 @@ void PathProof::forget(const scene::Environment& environment, double time_s, Ind
 // docs/theory.md (14.35): an interval is proved by its chord, with what the curve strays from it.
 void PathProof::begin() {
   const timing::TimedPath& motion = path_->motion;
-  timing::TimedPath::Cursor cursor;
-  cursor.node = end_;
   const double from = motion.place[end_], to = motion.place[end_ + 1];
   const Index piece = motion.curve.at(0.5 * (from + to), q0_, v_, a_);
   motion.curve.bound_bend(piece, from, to, bend_);

@@ -57,14 +57,12 @@ class Blending {
   static constexpr double loss_m = 5e-4;
   /// How far a deviation of the joints moves any part of the arm, or two parts to each other [m].
   [[nodiscard]] double reach(const Eigen::VectorXd& deviation) const;
-  [[nodiscard]] long proofs() const noexcept { return proofs_; }
 
  private:
   [[nodiscard]] bool is_clear(const BlendedPath& path, Eigen::Index point,
                               const search::Margins& margins, search::Query& query);
 
   const scene::Levers& levers_;
-  long proofs_ = 0;
 };
 
 }  // namespace hamelin::timing

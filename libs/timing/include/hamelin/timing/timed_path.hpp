@@ -40,8 +40,6 @@ struct TimedPath {
   [[nodiscard]] Place project(const Eigen::VectorXd& q_arm, const Eigen::VectorXd& v_arm,
                               const Place& near, Cursor& cursor, Eigen::VectorXd& q,
                               Eigen::VectorXd& v, Eigen::VectorXd& a) const;
-  /// The first time at which it has come so far along the curve.
-  [[nodiscard]] double time_at(double place) const;
   /// The motion at times that are at most `spacing_s` apart.
   [[nodiscard]] scene::JointTrajectory sampled(double spacing_s) const;
 };
