@@ -26,7 +26,8 @@ struct CertifiedPath {
 
 /// A motion to rest along a certified path, from near it: docs/theory.md (14.31)–(14.33). Where
 /// Γ(θ) is the path's own motion, the arm moves at Γ(θ(t)) + δ(t): the rate ρ = dθ/dt falls at the
-/// constant rate β, and the deviation at the beginning fades as e^{−ωt} (e + (ė + ωe) t).
+/// rate β, constant on each interval, and the deviation at the beginning fades as
+/// e^{−ωt} (e + (ė + ωe) t).
 class PathStop {
  public:
   explicit PathStop(Eigen::Index dof);
