@@ -52,6 +52,13 @@ void Levers::set() {
   }
 }
 
+double Levers::reach(const VectorXd& deviation) const {
+  double most = 0.0;
+  for (const Eigen::MatrixXd* levers : {&shapes_, &pairs_})
+    for (Index s = 0; s < levers->rows(); ++s) most = std::max(most, levers->row(s).dot(deviation));
+  return most;
+}
+
 void Levers::extend_travel(const VectorXd& q, const VectorXd& stray) {
   bool extended = false;
   for (Index j = 0; j < q.size(); ++j)

@@ -84,13 +84,6 @@ Curve BlendedPath::curve() const {
   return out;
 }
 
-double Blending::reach(const VectorXd& deviation) const {
-  double most = 0.0;
-  if (levers_.shapes().rows() > 0) most = (levers_.shapes() * deviation).maxCoeff();
-  if (levers_.pairs().rows() > 0) most = std::max(most, (levers_.pairs() * deviation).maxCoeff());
-  return most;
-}
-
 // What the blend strays from its chords is kept besides the margins.
 bool Blending::is_clear(const BlendedPath& path, Index point, const search::Margins& margins,
                         search::Query& query) {
@@ -98,7 +91,7 @@ bool Blending::is_clear(const BlendedPath& path, Index point, const search::Marg
   const int n = std::max(chords_least, 2 * static_cast<int>(std::ceil(d / chord)));
   const double h = 2.0 * d / n;
   const VectorXd stray = h * h / (8.0 * d) * path.turn(point).cwiseAbs();
-  query.set_margins(margins.raised(reach(stray) + margins.slope() * stray.norm()));
+  query.set_margins(margins.raised(levers_.reach(stray) + margins.slope() * stray.norm()));
   VectorXd last, next;
   path.blend_at(point, -d, last);
   for (int k = 1; k <= n; ++k) {
@@ -112,7 +105,7 @@ bool Blending::is_clear(const BlendedPath& path, Index point, const search::Marg
 void Blending::widen(BlendedPath& path, const search::Margins& margins, search::Query& query,
                      Index first, Index last) {
   for (Index i = first; i <= last; ++i) {
-    const double cut = reach(path.turn(i).cwiseAbs()) / 6.0, room = path.room(i),
+    const double cut = levers_.reach(path.turn(i).cwiseAbs()) / 6.0, room = path.room(i),
                  free = std::min(room, cut > 0.0 ? loss_m / cut : room);  // needs no proof
     double d = std::clamp(path.half_length(i), free, room);
     path.set_half_length(i, d);

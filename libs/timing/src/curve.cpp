@@ -86,9 +86,17 @@ bool Curve::is_smooth() const {
   return true;
 }
 
+void Curve::bound_bend(double from, double to, VectorXd& bend) const {
+  const double* const knots = knots_.data();
+  Index piece = std::upper_bound(knots + 1, knots + pieces_, from) - knots - 1;
+  bend.setZero();
+  for (; piece < pieces_ && knots_[piece] < to; ++piece)
+    include_bend(piece, std::max(from, knots_[piece]), std::min(to, knots_[piece + 1]), bend);
+}
+
 // The second derivative is a polynomial of degree three at most: it is within the hull of its
 // Bernstein coefficients.
-void Curve::bound_bend(Index piece, double from, double to, VectorXd& bend) const {
+void Curve::include_bend(Index piece, double from, double to, VectorXd& bend) const {
   const double a = from - knots_[piece], h = to - from;
   const auto second = [&](Index j, double x, double& value, double& slope) {
     value = slope = 0.0;
@@ -102,8 +110,8 @@ void Curve::bound_bend(Index piece, double from, double to, VectorXd& bend) cons
     double f0 = 0.0, g0 = 0.0, f1 = 0.0, g1 = 0.0;
     second(j, a, f0, g0);
     second(j, a + h, f1, g1);
-    bend[j] = std::max(
-        {std::abs(f0), std::abs(f0 + g0 * h / 3.0), std::abs(f1 - g1 * h / 3.0), std::abs(f1)});
+    bend[j] = std::max({bend[j], std::abs(f0), std::abs(f0 + g0 * h / 3.0),
+                        std::abs(f1 - g1 * h / 3.0), std::abs(f1)});
   }
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "averaged_motion.hpp"
 #include "hamelin/core/error.hpp"
 
 namespace hamelin::timing {
@@ -23,6 +24,15 @@ constexpr int solutions_max = 4;
 // Slopes and coefficients that count as zero, relative to a limit.
 constexpr double negligible = 1e-12;
 constexpr double squared_speed_max = 1e8;
+// The window over which a motion is averaged: at first, at most [s], and its intervals; how often it
+// and the shares are changed.
+constexpr double least_window_s = 0.02, longest_window_s = 0.5;
+constexpr int window_intervals = 4, averages_max = 16;
+// What the window alone may use of the bounds of rates, and by how much more is corrected than is
+// exceeded.
+constexpr double ramp_share = 0.8, corrected = 0.99;
+// Averaged motions keep this share of the limits: pieces of the curve meet within their intervals.
+constexpr double averaged_share = 0.995;
 
 void check(const VectorXd& limit, const char* name, Index dof, bool optional) {
   if (optional && limit.size() == 0) return;
@@ -32,6 +42,14 @@ void check(const VectorXd& limit, const char* name, Index dof, bool optional) {
         fmt::format("time law: {}: expected {} positive numbers (one per joint)", name, dof));
 }
 
+// The largest value of a parabola through three, docs/theory.md (19.9), and of its slope by `h`.
+double largest_value(double f0, double f1, double f2) {
+  return std::max({std::abs(f0), std::abs(f1), std::abs(f2)}) + std::abs(f0 - 2.0 * f1 + f2) / 8.0;
+}
+double largest_slope(double f0, double f1, double f2, double h) {
+  return std::max(std::abs(-3.0 * f0 + 4.0 * f1 - f2), std::abs(f0 - 4.0 * f1 + 3.0 * f2)) / h;
+}
+
 }  // namespace
 
 TimeLaw::TimeLaw(const model::Model& model, Limits limits, Grid grid)
@@ -39,6 +57,8 @@ TimeLaw::TimeLaw(const model::Model& model, Limits limits, Grid grid)
   check(limits_.velocity, "velocity", model.dof(), true);
   check(limits_.acceleration, "acceleration", model.dof(), false);
   check(limits_.torque, "torque", model.dof(), true);
+  check(limits_.jerk, "jerk", model.dof(), true);
+  check(limits_.torque_rate, "torque_rate", model.dof(), true);
 }
 
 void TimeLaw::add_nodes(double from, double to, Index count) {
@@ -52,33 +72,34 @@ void TimeLaw::set_nodes(const Curve& curve) {
   VectorXd bend(curve.dof());
   for (Index k = 0; k < curve.pieces(); ++k) {
     const double from = curve.knot(k), to = curve.knot(k + 1);
-    curve.bound_bend(k, from, to, bend);
+    curve.bound_bend(from, to, bend);
     const bool straight = bend.isZero(0.0);
     const auto by_length = static_cast<Index>(std::ceil((to - from) / grid_.spacing));
     add_nodes(from, to, straight ? by_length : std::max(grid_.nodes_per_bend, by_length));
   }
   places_ = Eigen::Map<const VectorXd>(nodes_.data(), static_cast<Index>(nodes_.size()));
-  between_ = 0.5 * (places_.head(places_.size() - 1) + places_.tail(places_.size() - 1));
 }
 
-void TimeLaw::evaluate(const Curve& curve, const VectorXd& places) {
+void TimeLaw::evaluate(const Curve& curve, const VectorXd& places, bool torques, Rows& out) {
   const Index n = places.size(), dof = model_.dof();
-  for (auto* x : {&q_, &dq_, &ddq_, &inertia_, &bias_, &gravity_}) x->resize(dof, n);
-  zero_ = dynamics::StatesXd::Zero(dof, n);
+  for (auto* x : {&q_, &out.tangent, &out.curvature}) x->resize(dof, n);
   VectorXd q(dof), dq(dof), ddq(dof);
   Index piece = 0;
   for (Index i = 0; i < n; ++i) {
     piece = curve.at(places[i], q, dq, ddq, piece);
     q_.col(i) = q;
-    dq_.col(i) = dq;
-    ddq_.col(i) = ddq;
+    out.tangent.col(i) = dq;
+    out.curvature.col(i) = ddq;
   }
-  if (limits_.torque.size() == 0 && !keeps_dynamics_) return;
-  dynamics::inverse_dynamics(model_, ws_, q_, zero_, zero_, gravity_);
-  dynamics::inverse_dynamics(model_, ws_, q_, zero_, dq_, inertia_);
-  dynamics::inverse_dynamics(model_, ws_, q_, dq_, ddq_, bias_);
-  inertia_ -= gravity_;
-  bias_ -= gravity_;
+  if (!torques) return;
+  evaluated_ += n;
+  for (auto* x : {&out.inertia, &out.bias, &out.gravity}) x->resize(dof, n);
+  zero_ = dynamics::StatesXd::Zero(dof, n);
+  dynamics::inverse_dynamics(model_, ws_, q_, zero_, zero_, out.gravity);
+  dynamics::inverse_dynamics(model_, ws_, q_, zero_, out.tangent, out.inertia);
+  dynamics::inverse_dynamics(model_, ws_, q_, out.tangent, out.curvature, out.bias);
+  out.inertia -= out.gravity;
+  out.bias -= out.gravity;
 }
 
 // docs/theory.md (19.6): rows at a node, where x is that of the interval's beginning + lead · u.
@@ -94,20 +115,20 @@ void TimeLaw::add_lines(Index node, double lead, double share, double& x_max) {
     }
   };
   for (Index j = 0; j < limits_.torque.size(); ++j) {
-    const double g = gravity_(j, node), most = share * limits_.torque[j];
-    add(inertia_(j, node), bias_(j, node), -most - g, most - g);
+    const double g = rows_.gravity(j, node), most = limits_.torque[j];
+    add(rows_.inertia(j, node), rows_.bias(j, node), share * (-most - g), share * (most - g));
   }
   for (Index j = 0; j < limits_.acceleration.size(); ++j) {
     const double most = share * limits_.acceleration[j];
-    add(dq_(j, node), ddq_(j, node), -most, most);
+    add(rows_.tangent(j, node), rows_.curvature(j, node), -most, most);
   }
 }
 
-void TimeLaw::set_lines(Index interval, double share, double& x_max) {
+void TimeLaw::set_lines(Index interval, double& x_max) {
   lines_.clear();
   const double h = places_[interval + 1] - places_[interval];
-  add_lines(interval, 0.0, share, x_max);
-  add_lines(interval + 1, 2.0 * h, share, x_max);
+  add_lines(interval, 0.0, shares_[interval], x_max);
+  add_lines(interval + 1, 2.0 * h, shares_[interval], x_max);
 }
 
 TimeLaw::Range TimeLaw::range(double x) const {
@@ -142,21 +163,20 @@ double TimeLaw::largest(double x_max) const {
 }
 
 // docs/theory.md (19.7): the largest squared speeds from which rest can be reached.
-bool TimeLaw::backward(const Start& start, double share) {
+bool TimeLaw::backward() {
   const Index n = places_.size();
   squared_max_ = VectorXd::Constant(n, squared_speed_max);
-  if (start.speed_max > 0.0)
-    squared_max_ = squared_max_.cwiseMin(start.speed_max * start.speed_max);
-  for (Index i = 0; i < n; ++i)
+  for (Index i = 0; i < n; ++i) {
+    const double share = std::min(shares_[std::min(i, n - 2)], shares_[std::max<Index>(i - 1, 0)]);
     for (Index j = 0; j < limits_.velocity.size(); ++j)
-      if (dq_(j, i) != 0.0)
-        squared_max_[i] =
-            std::min(squared_max_[i], std::pow(share * limits_.velocity[j] / dq_(j, i), 2));
+      if (const double slope = rows_.tangent(j, i); slope != 0.0)
+        squared_max_[i] = std::min(squared_max_[i], std::pow(share * limits_.velocity[j] / slope, 2));
+  }
   controllable_.resize(n);
   controllable_[n - 1] = 0.0;
   for (Index i = n - 2; i >= 0; --i) {
     const double h2 = 2.0 * (places_[i + 1] - places_[i]);
-    set_lines(i, share, squared_max_[i]);
+    set_lines(i, squared_max_[i]);
     lines_.push_back({0.0, controllable_[i + 1] / h2, 1.0 / h2});
     controllable_[i] = largest(squared_max_[i]);
     if (controllable_[i] < 0.0) return false;
@@ -164,21 +184,22 @@ bool TimeLaw::backward(const Start& start, double share) {
   return true;
 }
 
-bool TimeLaw::forward(TimedPath& out, const Start& start, double share) {
+bool TimeLaw::forward(TimedPath& out, double speed) {
   const Index n = places_.size();
   constexpr double rounding = 1e-9;
-  double x = start.speed * start.speed;
+  double x = speed * speed;
   if (x > controllable_[0] * (1.0 + rounding) + rounding) return false;
   out.place = places_;
   out.time_s.resize(n);
   out.speed.resize(n);
   out.rate.resize(n - 1);
+  out.ramp = VectorXd::Zero(n - 1);
   out.time_s[0] = 0.0;
-  out.speed[0] = start.speed;
+  out.speed[0] = speed;
   double unused = infinity;
   for (Index i = 0; i + 1 < n; ++i) {
     const double h2 = 2.0 * (places_[i + 1] - places_[i]);
-    set_lines(i, share, unused);
+    set_lines(i, unused);
     const Range allowed = range(x);
     const double u = std::min(std::max(allowed.high, -x / h2), (controllable_[i + 1] - x) / h2);
     const double next = std::max(0.0, x + h2 * u);
@@ -192,42 +213,12 @@ bool TimeLaw::forward(TimedPath& out, const Start& start, double share) {
   return true;
 }
 
-// docs/theory.md (19.9): at the middle of each interval, with what a parabola through three points
-// may rise between them.
-double TimeLaw::excess(const TimedPath& motion) {
-  double most = 0.0;
-  const Index n = places_.size();
-  const auto rise = [](double f0, double f1, double f2) {
-    return std::max({std::abs(f0), std::abs(f1), std::abs(f2)}) +
-           std::abs(f0 - 2.0 * f1 + f2) / 8.0;
-  };
-  for (Index i = 0; i + 1 < n; ++i) {
-    const double u = motion.rate[i], x0 = motion.speed[i] * motion.speed[i],
-                 x2 = motion.speed[i + 1] * motion.speed[i + 1], x1 = 0.5 * (x0 + x2);
-    for (Index j = 0; j < model_.dof(); ++j) {
-      const double a =
-          rise(dq_(j, i) * u + ddq_(j, i) * x0, mid_dq_(j, i) * u + mid_ddq_(j, i) * x1,
-               dq_(j, i + 1) * u + ddq_(j, i + 1) * x2);
-      most = std::max(most, a / limits_.acceleration[j]);
-      if (limits_.torque.size() > 0) {
-        const double t = rise(inertia_(j, i) * u + bias_(j, i) * x0 + gravity_(j, i),
-                              mid_inertia_(j, i) * u + mid_bias_(j, i) * x1 + mid_gravity_(j, i),
-                              inertia_(j, i + 1) * u + bias_(j, i + 1) * x2 + gravity_(j, i + 1));
-        most = std::max(most, t / limits_.torque[j]);
-      }
-      if (limits_.velocity.size() > 0)
-        most = std::max(most, std::abs(mid_dq_(j, i)) * std::sqrt(x1) / limits_.velocity[j]);
-    }
-  }
-  return most;
-}
-
-bool TimeLaw::pass(TimedPath& out, const Start& start, double share) {
-  if (!backward(start, share)) {
+bool TimeLaw::pass(TimedPath& out, double speed) {
+  if (!backward()) {
     cause_ = "the limits do not hold the arm everywhere on the path";
     return false;
   }
-  if (forward(out, start, share)) return true;
+  if (forward(out, speed)) return true;
   cause_ = "the arm is too fast at the beginning of the path";
   return false;
 }
@@ -235,41 +226,130 @@ bool TimeLaw::pass(TimedPath& out, const Start& start, double share) {
 double TimeLaw::duration_s(const Curve& curve) {
   if (!curve.is_smooth()) return infinity;
   set_nodes(curve);
-  keeps_dynamics_ = false;
-  evaluate(curve, places_);
-  return pass(trial_, {}, first_share) ? trial_.duration_s() : infinity;
+  evaluate(curve, places_, limits_.torque.size() > 0, rows_);
+  shares_ = VectorXd::Constant(places_.size() - 1, first_share);
+  return pass(trial_, 0.0) ? trial_.duration_s() : infinity;
 }
 
-bool TimeLaw::solve(TimedPath& out, const Start& start) {
-  keeps_dynamics_ = true;
+bool TimeLaw::solve(TimedPath& out, double speed) {
   if (!out.curve.is_smooth()) {
     cause_ = "the path has a corner";
     return false;
   }
+  evaluated_ = 0;
   set_nodes(out.curve);
-  evaluate(out.curve, between_);
-  std::swap(mid_dq_, dq_);
-  std::swap(mid_ddq_, ddq_);
-  std::swap(mid_inertia_, inertia_);
-  std::swap(mid_bias_, bias_);
-  std::swap(mid_gravity_, gravity_);
-  evaluate(out.curve, places_);
-  double share = first_share;
+  evaluate(out.curve, places_, true, rows_);
+  shares_ = VectorXd::Constant(places_.size() - 1, first_share);
+  return limits_.have_rates() ? solve_with_ramps(out) : solve_with_jumps(out, speed);
+}
+
+bool TimeLaw::solve_with_jumps(TimedPath& out, double speed) {
   for (int i = 0; i < solutions_max; ++i) {
-    if (!pass(out, start, share)) return false;
-    const double used = excess(out);
-    if (used <= 1.0) {
-      out.inertia = inertia_;
-      out.bias = bias_;
-      out.gravity = gravity_;
-      out.tangent = dq_;
-      out.curvature = ddq_;
+    if (!pass(out, speed)) return false;
+    if (i == 0) evaluate_between(out);
+    double most = 0.0;
+    for (Index k = 0; k + 1 < out.nodes(); ++k) most = std::max(most, used(out, k, rows_).values);
+    if (most <= 1.0) {
+      store(rows_, out);
       return true;
     }
-    share *= std::min(0.999, 0.999 / used);
+    shares_ *= std::min(0.999, 0.999 / most);
   }
   cause_ = "torques between the nodes of the path exceed their limits";
   return false;
+}
+
+// Accelerations that are exceeded are lowered where they come from, and the window is made longer
+// until rates are not exceeded.
+bool TimeLaw::solve_with_ramps(TimedPath& out) {
+  double window_s = least_window_s;
+  for (int i = 0; i < averages_max && window_s <= longest_window_s; ++i) {
+    if (!pass(trial_, 0.0)) return false;
+    average(trial_, window_s, window_intervals, out);
+    evaluate(out.curve, out.place, true, averaged_);
+    evaluate_between(out);
+    lowered_ = VectorXd::Ones(shares_.size());
+    Used most;
+    for (Index k = 0; k + 1 < out.nodes(); ++k) {
+      Used at = used(out, k, averaged_);
+      at.values /= averaged_share;
+      most = {std::max(most.values, at.values), std::max(most.rates, at.rates),
+              std::max(most.ramp, at.ramp)};
+      // rates grow with the third power of the speed, and accelerations with its square
+      const double excess = at.ramp > ramp_share ? at.values
+                                                 : std::max(at.values, std::pow(at.rates, 2.0 / 3));
+      if (excess > 1.0) lower_shares(out, k, window_s, corrected / excess);
+    }
+    if (std::max(most.values, most.rates) <= 1.0) {
+      store(averaged_, out);
+      return true;
+    }
+    shares_ = shares_.cwiseProduct(lowered_);
+    if (most.ramp > ramp_share) window_s *= most.ramp / (corrected * ramp_share);
+  }
+  cause_ = "the bounds of jerk and torque rate leave no motion";
+  return false;
+}
+
+void TimeLaw::lower_shares(const TimedPath& averaged, Index interval, double window_s,
+                           double factor) {
+  const double from = averaged.time_s[interval] - window_s, to = averaged.time_s[interval + 1];
+  for (Index k = 0; k + 1 < trial_.nodes() && trial_.time_s[k] <= to; ++k)
+    if (trial_.time_s[k + 1] >= from) lowered_[k] = std::min(lowered_[k], factor);
+}
+
+void TimeLaw::evaluate_between(const TimedPath& motion) {
+  const Index n = motion.nodes() - 1;
+  VectorXd places(n);
+  for (Index k = 0; k < n; ++k) {
+    const double h = 0.5 * (motion.time_s[k + 1] - motion.time_s[k]);
+    places[k] = motion.place[k] +
+                h * (motion.speed[k] + h * (0.5 * motion.rate[k] + h * motion.ramp[k] / 6.0));
+  }
+  if (!limits_.have_rates()) places = 0.5 * (motion.place.head(n) + motion.place.tail(n));
+  evaluate(motion.curve, places, true, between_);
+}
+
+// docs/theory.md (19.9): at the ends and in the middle of an interval, with what a parabola through
+// three points may rise between them.
+TimeLaw::Used TimeLaw::used(const TimedPath& motion, Index i, const Rows& nodes) const {
+  Used out;
+  const double h = motion.time_s[i + 1] - motion.time_s[i], r = motion.ramp[i],
+               u0 = motion.rate[i], u1 = u0 + 0.5 * h * r, u2 = u0 + h * r,
+               x0 = motion.speed[i] * motion.speed[i],
+               x2 = motion.speed[i + 1] * motion.speed[i + 1],
+               w1 = motion.speed[i] + 0.5 * h * (u0 + 0.25 * h * r),
+               x1 = limits_.have_rates() ? w1 * w1 : 0.5 * (x0 + x2);
+  const auto raise = [](double& most, double value, const VectorXd& limit, Index j) {
+    if (limit.size() > 0) most = std::max(most, value / limit[j]);
+  };
+  for (Index j = 0; j < model_.dof(); ++j) {
+    const double a0 = nodes.tangent(j, i) * u0 + nodes.curvature(j, i) * x0,
+                 a1 = between_.tangent(j, i) * u1 + between_.curvature(j, i) * x1,
+                 a2 = nodes.tangent(j, i + 1) * u2 + nodes.curvature(j, i + 1) * x2,
+                 t0 = nodes.inertia(j, i) * u0 + nodes.bias(j, i) * x0 + nodes.gravity(j, i),
+                 t1 = between_.inertia(j, i) * u1 + between_.bias(j, i) * x1 +
+                      between_.gravity(j, i),
+                 t2 = nodes.inertia(j, i + 1) * u2 + nodes.bias(j, i + 1) * x2 +
+                      nodes.gravity(j, i + 1);
+    raise(out.values, largest_value(a0, a1, a2), limits_.acceleration, j);
+    raise(out.values, largest_value(t0, t1, t2), limits_.torque, j);
+    raise(out.values, std::abs(between_.tangent(j, i)) * std::sqrt(x1), limits_.velocity, j);
+    raise(out.values, std::abs(nodes.tangent(j, i)) * motion.speed[i], limits_.velocity, j);
+    raise(out.rates, largest_slope(a0, a1, a2, h), limits_.jerk, j);
+    raise(out.rates, largest_slope(t0, t1, t2, h), limits_.torque_rate, j);
+    raise(out.ramp, std::abs(r * between_.tangent(j, i)), limits_.jerk, j);
+    raise(out.ramp, std::abs(r * between_.inertia(j, i)), limits_.torque_rate, j);
+  }
+  return out;
+}
+
+void TimeLaw::store(const Rows& nodes, TimedPath& out) {
+  out.inertia = nodes.inertia;
+  out.bias = nodes.bias;
+  out.gravity = nodes.gravity;
+  out.tangent = nodes.tangent;
+  out.curvature = nodes.curvature;
 }
 
 }  // namespace hamelin::timing

@@ -14,10 +14,20 @@ void TimedPath::at(double t, VectorXd& q, VectorXd& v, VectorXd& a, Cursor& curs
   if (time_s[i] > t) i = cursor.piece = 0;
   const double *const times = time_s.data(), *const last = times + nodes() - 1;
   i = std::min(std::upper_bound(times + i + 1, last, t) - times, nodes() - 1) - 1;
-  const double dt = t - time_s[i], u = rate[i], w = speed[i] + u * dt;
-  cursor.piece = curve.at(place[i] + dt * (speed[i] + 0.5 * u * dt), q, v, a, cursor.piece);
+  const double dt = t - time_s[i], r = ramp[i], u = rate[i] + r * dt,
+               w = speed[i] + dt * (rate[i] + 0.5 * r * dt),
+               s = place[i] + dt * (speed[i] + dt * (0.5 * rate[i] + dt * r / 6.0));
+  cursor.piece = curve.at(s, q, v, a, cursor.piece);
   a = w * w * a + u * v;
   v *= w;
+}
+
+void TimedPath::chord(Index interval, VectorXd& from, VectorXd& to, VectorXd& stray) const {
+  const double a = place[interval], b = place[interval + 1];
+  curve.at(a, from, stray, to);
+  curve.at(b, to, stray, stray);
+  curve.bound_bend(a, b, stray);
+  stray *= 0.125 * (b - a) * (b - a);
 }
 
 TimedPath::Place TimedPath::project(const VectorXd& q_arm, const VectorXd& v_arm, const Place& near,

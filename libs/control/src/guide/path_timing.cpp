@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 namespace hamelin::control {
@@ -20,12 +22,16 @@ constexpr double default_acceleration = 15.0;  // [rad/s² or m/s²]
 // may cost; fewer where checks take longer than so [s]: the arm waits for them.
 constexpr double tries_max = 200.0, improve_checks = 2000.0, usual_check_s = 2e-6;
 constexpr long checks_per_try = 5;
+// Of bounds of rates, the shares that a motion uses, the change of a stop's braking, and both with
+// the braking; and the largest such change, where the bounds do not say it [1/s²].
+constexpr double rate_share = 0.5, ramp_share = 0.2, whole_rate = 0.9, braking_ramp_most = 2000.0;
+constexpr double infinity = std::numeric_limits<double>::infinity();
 // Intervals that keep less are examined again [m].
 constexpr double enough_m = 0.004;
 // Factors of such a margin that are tried.
 constexpr std::array<double, 3> higher{4.0, 2.5, 1.6};
-// Nodes of a motion that cost as much as a check.
-constexpr Index nodes_per_check = 4;
+// Places at which torques are evaluated, that cost as much as a check.
+constexpr long places_per_check = 8;
 // The mass matrix is evaluated at so many places, and may be larger between them.
 constexpr int mass_places = 5;
 constexpr double mass_between = 1.1;
@@ -33,7 +39,8 @@ constexpr double mass_between = 1.1;
 }  // namespace
 
 timing::Limits path_limits(const scene::Scene& scene, const model::Model& model,
-                           const LimitReserve& reserve, const Json& params) {
+                           const LimitReserve& reserve, const Json& params,
+                           const ChangeBounds& changes) {
   const ModelledLimits modelled = modelled_limits(scene, model.robot());
   timing::Limits out;
   out.velocity = modelled.velocity_max;
@@ -42,7 +49,13 @@ timing::Limits path_limits(const scene::Scene& scene, const model::Model& model,
   const auto found = params.find("acceleration_max");
   const double most =
       found != params.end() && found->is_number() ? found->get<double>() : default_acceleration;
-  out.acceleration = VectorXd::Constant(model.dof(), acceleration_share * most);
+  out.acceleration = VectorXd::Constant(model.dof(), most);
+  if (changes.acceleration_max.size() > 0)
+    out.acceleration = out.acceleration.cwiseMin(changes.acceleration_max);
+  out.acceleration *= acceleration_share;
+  out.jerk = rate_share * changes.jerk_max;
+  if (changes.torque_rate > 0.0)
+    out.torque_rate = VectorXd::Constant(model.dof(), rate_share * changes.torque_rate);
   const double share =
       std::min(torque_share_most, scene::safety_bounds(scene).torque_share - torque_share_kept);
   out.torque = share * modelled.effort_max;
@@ -50,18 +63,21 @@ timing::Limits path_limits(const scene::Scene& scene, const model::Model& model,
 }
 
 PathTiming::PathTiming(const scene::Scene& scene, const model::Model& model,
-                       const scene::SelfField* self, timing::Limits limits,
-                       const search::Settings& settings)
+                       const scene::SelfField* self, const timing::Limits& limits,
+                       VectorXd stop_acceleration, const search::Settings& settings)
     : model_(model),
+      limits_(limits),
+      stop_acceleration_(std::move(stop_acceleration)),
       levers_(model, self),
       blending_(levers_),
       way_points_(model, levers_, limits, settings.q_lower, settings.q_upper),
-      law_(model, std::move(limits)),
+      law_(model, limits),
       seed_(settings.seed),
       ws_(model) {
   const ModelledLimits modelled = modelled_limits(scene, model.robot());
   const double share = usual_check_s / std::max(usual_check_s, scene.guide.check_time_s);
   effort_ = {static_cast<int>(tries_max * share), static_cast<long>(improve_checks * share)};
+  from_ = to_ = stray_ = VectorXd::Zero(model.dof());
   q_lower_ = modelled.q_lower;
   q_upper_ = modelled.q_upper;
 }
@@ -88,56 +104,43 @@ std::unique_ptr<CertifiedPath> PathTiming::make(search::Query& query) {
   (void)way_points_.improve(*best_, *margins_, query, rng_, effort_);
   auto out = std::make_unique<CertifiedPath>();
   out->motion.curve = best_->curve();
-  const bool found = law_.solve(out->motion);
-  cause_ = found ? std::string_view() : law_.cause();
-  if (!found) return nullptr;
-  out->limits = law_.limits();
-  checks_ += out->motion.nodes() / nodes_per_check;
+  if (!law_.solve(out->motion)) return nullptr;
+  out->limits = limits_;
+  checks_ += law_.evaluated() / places_per_check;
   set_margins(*out, *margins_);
   raise_margins(*out, query);
   set_room(*out);
   set_mass(*out);
+  set_braking(*out);
+  out->stop_acceleration = stop_acceleration_;
   return out;
 }
 
 // docs/theory.md (14.30)
-void PathTiming::set_margins(CertifiedPath& out, const search::Margins& margins) const {
-  const timing::TimedPath& motion = out.motion;
-  const Index n = motion.nodes() - 1;
+void PathTiming::set_margins(CertifiedPath& out, const search::Margins& margins) {
+  const Index n = out.motion.nodes() - 1;
   out.clearance_m.resize(n);
   out.self_m.resize(n);
-  VectorXd from(model_.dof()), to(from), unused(from), bend(from);
-  motion.curve.at(0.0, from, unused, unused);
   for (Index k = 0; k < n; ++k) {
-    const double a = motion.place[k], b = motion.place[k + 1];
-    const Index piece = motion.curve.at(0.5 * (a + b), to, unused, unused);
-    motion.curve.bound_bend(piece, a, b, bend);
-    const double loss = bend.isZero(0.0) ? 0.0 : timing::Blending::loss_m;
-    motion.curve.at(b, to, unused, unused);
-    out.clearance_m[k] = margins.least(from, to) - loss;
-    out.self_m[k] = std::min(margins.least(from, to), margins.self_most_m()) - loss;
-    from.swap(to);
+    out.motion.chord(k, from_, to_, stray_);
+    const double loss = stray_.isZero(0.0) ? 0.0 : timing::Blending::loss_m;
+    out.clearance_m[k] = margins.least(from_, to_) - loss;
+    out.self_m[k] = std::min(margins.least(from_, to_), margins.self_most_m()) - loss;
   }
 }
 
-void PathTiming::raise_margins(CertifiedPath& out, search::Query& query) const {
-  const timing::TimedPath& motion = out.motion;
-  VectorXd from(model_.dof()), to(from), unused(from), bend(from);
-  for (Index k = 0; k + 1 < motion.nodes(); ++k) {
+void PathTiming::raise_margins(CertifiedPath& out, search::Query& query) {
+  for (Index k = 0; k + 1 < out.motion.nodes(); ++k) {
     if (std::min(out.clearance_m[k], out.self_m[k]) >= enough_m) continue;
-    const double a = motion.place[k], b = motion.place[k + 1];
-    const Index piece = motion.curve.at(0.5 * (a + b), from, to, unused);
-    motion.curve.bound_bend(piece, a, b, bend);
-    const double stray = blending_.reach(0.125 * (b - a) * (b - a) * bend);
-    motion.curve.at(a, from, unused, unused);
-    motion.curve.at(b, to, unused, unused);
+    out.motion.chord(k, from_, to_, stray_);
+    const double stray = levers_.reach(stray_);
     for (const double factor : higher) {
       const auto raised = [&](double m) { return std::max(m, std::min(enough_m, factor * m)); };
       const double clearance = raised(out.clearance_m[k]), self = raised(out.self_m[k]);
       search::Margins margins(clearance + stray);
       margins.set_self_most(self + stray);
       query.set_margins(margins);
-      if (!query.motion_clear(from, to)) continue;
+      if (!query.motion_clear(from_, to_)) continue;
       out.clearance_m[k] = clearance;
       out.self_m[k] = std::min(self, clearance);
       break;
@@ -145,20 +148,71 @@ void PathTiming::raise_margins(CertifiedPath& out, search::Query& query) const {
   }
 }
 
-void PathTiming::set_room(CertifiedPath& out) const {
+void PathTiming::set_room(CertifiedPath& out) {
   if (q_lower_.size() == 0) return;
-  const timing::TimedPath& motion = out.motion;
-  const Index n = motion.nodes() - 1;
+  const Index n = out.motion.nodes() - 1;
   out.room.resize(model_.dof(), n);
-  VectorXd from(model_.dof()), to(from), unused(from), bend(from);
   for (Index k = 0; k < n; ++k) {
-    const double a = motion.place[k], b = motion.place[k + 1];
-    const Index piece = motion.curve.at(0.5 * (a + b), from, to, unused);
-    motion.curve.bound_bend(piece, a, b, bend);
-    motion.curve.at(a, from, unused, unused);
-    motion.curve.at(b, to, unused, unused);
-    out.room.col(k) = (from.cwiseMin(to) - q_lower_).cwiseMin(q_upper_ - from.cwiseMax(to)) -
-                      0.125 * (b - a) * (b - a) * bend;
+    out.motion.chord(k, from_, to_, stray_);
+    out.room.col(k) =
+        (from_.cwiseMin(to_) - q_lower_).cwiseMin(q_upper_ - from_.cwiseMax(to_)) - stray_;
+  }
+}
+
+// docs/theory.md (14.37)
+void PathTiming::set_braking(CertifiedPath& out) const {
+  if (!limits_.have_rates()) return;
+  const timing::TimedPath& motion = out.motion;
+  const Index n = motion.nodes();
+  double ramp = braking_ramp_most;
+  for (Index k = 0; k < n; ++k)
+    for (Index j = 0; j < model_.dof(); ++j) {
+      const auto bound = [&](const VectorXd& rate, double size) {
+        if (rate.size() > 0 && size * ramp > ramp_share * rate[j] / rate_share)
+          ramp = ramp_share * rate[j] / rate_share / size;
+      };
+      bound(limits_.jerk, std::abs(motion.tangent(j, k)) * motion.speed[k]);
+      bound(limits_.torque_rate, std::abs(motion.inertia(j, k)) * motion.speed[k]);
+    }
+  out.braking_ramp = ramp;
+  out.braking_max = VectorXd::Constant(n, infinity);
+  for (Index k = 0; k < n; ++k) bound_braking(out, k);
+}
+
+void PathTiming::bound_braking(CertifiedPath& out, Index k) const {
+  const timing::TimedPath& motion = out.motion;
+  const auto rate_at = [&](Index i) {
+    return i + 1 < motion.nodes() ? motion.rate[i] : motion.rate_at_end(i - 1);
+  };
+  // what a row is without braking, and with it per β, at a node
+  const auto row = [&](const MatrixXd& by_rate, const MatrixXd& by_square, Index j, Index i) {
+    const double s = motion.speed[i];
+    return std::pair(by_rate(j, i) * rate_at(i) + by_square(j, i) * s * s, by_rate(j, i) * s);
+  };
+  double& most = out.braking_max[k];
+  const auto bound = [&](const MatrixXd& by_rate, const MatrixXd& by_square, double limit, Index j) {
+    const auto [value, slope] = row(by_rate, by_square, j, k);
+    double change = 0.0, change_of_slope = 0.0;
+    for (const Index i : {k - 1, k + 1}) {
+      if (i < 0 || i >= motion.nodes()) continue;
+      const auto [other, other_slope] = row(by_rate, by_square, j, i);
+      const double h = std::abs(motion.time_s[i] - motion.time_s[k]);
+      change = std::max(change, std::abs(other - value) / h);
+      change_of_slope = std::max(change_of_slope, std::abs(other_slope - slope) / h);
+    }
+    const double left = whole_rate * limit / rate_share - change - out.braking_ramp * std::abs(slope);
+    const double per_braking = 2.0 * std::abs(value) + change_of_slope;
+    if (per_braking * most > left) most = std::max(0.0, left / per_braking);
+  };
+  for (Index j = 0; j < model_.dof(); ++j) {
+    if (limits_.jerk.size() > 0) bound(motion.tangent, motion.curvature, limits_.jerk[j], j);
+    if (limits_.torque_rate.size() > 0)
+      bound(motion.inertia, motion.bias, limits_.torque_rate[j], j);
+    // at rest
+    if (limits_.torque.size() == 0) continue;
+    const double left = limits_.torque[j] - std::abs(motion.gravity(j, k)),
+                 slope = std::abs(motion.inertia(j, k)) * motion.speed[k];
+    if (slope * most > left) most = std::max(0.0, left / slope);
   }
 }
 

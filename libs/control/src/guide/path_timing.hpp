@@ -2,7 +2,6 @@
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
-#include <string>
 
 #include "guide/guide_query.hpp"
 #include "hamelin/control/planner_setup.hpp"
@@ -11,6 +10,7 @@
 #include "hamelin/timing/blended_path.hpp"
 #include "hamelin/timing/time_law.hpp"
 #include "hamelin/timing/way_points.hpp"
+#include "loop/stop_finder.hpp"
 #include "shield/certified_path.hpp"
 
 namespace hamelin::control {
@@ -18,16 +18,20 @@ namespace hamelin::control {
 /// The limits of motions along paths: within those of planner and shield, so that neither has to
 /// change them.
 /// @param reserve what a shield keeps @param params of the planner, for acceleration_max
+/// @param changes what the drives bound
 [[nodiscard]] timing::Limits path_limits(const scene::Scene& scene, const model::Model& model,
-                                         const LimitReserve& reserve, const Json& params);
+                                         const LimitReserve& reserve, const Json& params,
+                                         const ChangeBounds& changes);
 
 /// Makes timed motions of paths that a search has found, and says what is proved of them.
 class PathTiming {
  public:
   /// @param model kept by reference @param self null if self-collision is not modelled
+  /// @param stop_acceleration what stops may use; of size zero: no bound
   /// @param settings of the search, for the joint limits that way-points keep
   PathTiming(const scene::Scene& scene, const model::Model& model, const scene::SelfField* self,
-             timing::Limits limits, const search::Settings& settings);
+             const timing::Limits& limits, Eigen::VectorXd stop_acceleration,
+             const search::Settings& settings);
 
   /// Begins with the paths to a goal. @param number of the search, for random numbers
   void begin(std::uint64_t number);
@@ -37,22 +41,26 @@ class PathTiming {
   void consider(const Eigen::MatrixXd& points, const search::Margins& margins,
                 search::Query& query);
   /// Improves the fastest path and makes a motion along it.
-  /// @return null if there is none; see cause()
+  /// @return null if there is none
   [[nodiscard]] std::unique_ptr<CertifiedPath> make(search::Query& query);
   /// The way-points of the fastest path.
   [[nodiscard]] const Eigen::MatrixXd& points() const { return best_->points(); }
-  [[nodiscard]] const std::string& cause() const noexcept { return cause_; }
   /// Work beside that of the query, in checks.
   [[nodiscard]] long checks() const noexcept { return checks_; }
 
  private:
-  void set_margins(CertifiedPath& out, const search::Margins& margins) const;
+  void set_margins(CertifiedPath& out, const search::Margins& margins);
   /// Near a tight start or goal paths are proved with less than there is.
-  void raise_margins(CertifiedPath& out, search::Query& query) const;
-  void set_room(CertifiedPath& out) const;
+  void raise_margins(CertifiedPath& out, search::Query& query);
+  void set_room(CertifiedPath& out);
   void set_mass(CertifiedPath& out);
+  /// How stops may brake where rates are bounded.
+  void set_braking(CertifiedPath& out) const;
+  void bound_braking(CertifiedPath& out, Eigen::Index node) const;
 
   const model::Model& model_;
+  timing::Limits limits_;
+  Eigen::VectorXd stop_acceleration_;
   scene::Levers levers_;
   timing::Blending blending_;
   timing::WayPoints way_points_;
@@ -65,7 +73,7 @@ class PathTiming {
   double best_s_ = 0.0;
   Eigen::VectorXd q_lower_, q_upper_;
   dynamics::Workspace ws_;
-  std::string cause_;
+  Eigen::VectorXd from_, to_, stray_;
   long checks_ = 0;
 };
 

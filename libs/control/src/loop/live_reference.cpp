@@ -9,17 +9,19 @@ using Eigen::VectorXd;
 
 namespace {
 
-// The clock runs at full rate while no joint is farther from the reference than the first, and
-// stands still beyond the second [rad or m]: docs/theory.md (18.16).
-constexpr double error_full_rate = 0.02, error_standstill = 0.1;
 // Time in which the rate changes from 0 to 1 [s].
 constexpr double rate_change_s = 0.1;
 
-double rate_for(double error) {
-  return std::clamp((error_standstill - error) / (error_standstill - error_full_rate), 0.0, 1.0);
+}  // namespace
+
+double ReferenceState::rate_for(double error) noexcept {
+  return std::clamp((left_beyond - error) / (left_beyond - tracked_within), 0.0, 1.0);
 }
 
-}  // namespace
+void ReferenceState::slow_down(double rate_change) {
+  a = rate * rate * a + rate_change * v;
+  v *= rate;
+}
 
 LiveReference::LiveReference(Index dof)
     : between_(VectorXd::Zero(dof)), offset_(VectorXd::Zero(dof)) {
@@ -35,7 +37,7 @@ void LiveReference::start(const scene::Goal& goal) noexcept {
 }
 
 bool LiveReference::on_the_way() const noexcept {
-  return goal_ != nullptr && !state_.ended && state_.error < error_standstill;
+  return goal_ != nullptr && !state_.ended && state_.error < ReferenceState::left_beyond;
 }
 
 const ReferenceState& LiveReference::update(double period_s, const VectorXd& q, const VectorXd& v) {
@@ -44,7 +46,7 @@ const ReferenceState& LiveReference::update(double period_s, const VectorXd& q, 
   else
     begin(q);
   state_.error = error_of(q);
-  if (state_.error >= error_standstill) rejoin(q, v);
+  if (state_.error >= ReferenceState::left_beyond) rejoin(q, v);
   return state_;
 }
 
@@ -53,8 +55,8 @@ void LiveReference::begin(const VectorXd& q) {
   state_.rate = 1.0;
   evaluate(0.0);
   state_.error = error_of(q);
-  if (state_.error <= error_full_rate) return;
-  state_.rate = rate_for(state_.error);
+  if (state_.error <= ReferenceState::tracked_within) return;
+  state_.rate = ReferenceState::rate_for(state_.error);
   evaluate(0.0);
 }
 
@@ -72,7 +74,7 @@ void LiveReference::rejoin(const VectorXd& q, const VectorXd& v) {
 
 void LiveReference::move_on(double period_s) {
   const double step = period_s / rate_change_s, before = state_.rate;
-  state_.rate += std::clamp(rate_for(state_.error) - before, -step, step);
+  state_.rate += std::clamp(ReferenceState::rate_for(state_.error) - before, -step, step);
   state_.time_s += 0.5 * period_s * (before + state_.rate);
   evaluate((state_.rate - before) / period_s);
 }
@@ -87,8 +89,7 @@ void LiveReference::evaluate(double rate_change) {
     state_.a.setZero();
     return;
   }
-  state_.a = state_.rate * state_.rate * state_.a + rate_change * state_.v;
-  state_.v *= state_.rate;
+  state_.slow_down(rate_change);
 }
 
 double LiveReference::error_of(const VectorXd& q) const {
@@ -97,7 +98,7 @@ double LiveReference::error_of(const VectorXd& q) const {
 
 double LiveReference::time_near(const VectorXd& q) {
   const scene::JointTrajectory& trajectory = *goal_->trajectory;
-  double nearest = error_full_rate, found_s = -1.0;
+  double nearest = ReferenceState::tracked_within, found_s = -1.0;
   for (Index i = point_; i + 1 < trajectory.points(); ++i) {
     offset_ = trajectory.q.col(i + 1) - trajectory.q.col(i);
     between_ = q - trajectory.q.col(i);

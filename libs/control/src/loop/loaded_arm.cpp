@@ -69,10 +69,10 @@ std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, co
   const search::Settings settings = guide_settings(scene, model, view, reserve, params);
   std::unique_ptr<PathTiming> timing;
   const ChangeBounds changes = arm.drive.changes(scene);
-  const bool sudden = changes.torque_rate == 0.0 && changes.jerk_max.size() == 0;
-  if (sudden && arm.plugin.follows_trajectories())
+  if (arm.plugin.follows_trajectories())
     timing = std::make_unique<PathTiming>(scene, model, view.self_field(),
-                                          path_limits(scene, model, reserve, params), settings);
+                                          path_limits(scene, model, reserve, params, changes),
+                                          changes.acceleration_max, settings);
   return std::make_unique<GuideSearch>(
       model, arm.world, view, settings, std::move(timing), other_checks(scene.guide),
       static_cast<Eigen::Index>(arm.path_points_max), arm.guide_thread);

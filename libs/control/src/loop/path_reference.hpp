@@ -35,13 +35,16 @@ class PathReference {
 
  private:
   void move_on(double period_s, double rate_max);
-  void evaluate(double rate_change);
+  /// The same where the change of the rate may not jump.
+  void move_on_with_ramps(double period_s, double rate_max);
+  void evaluate();
   /// The largest change of the rate that the limits of the path allow, at most `most` [1/s].
   [[nodiscard]] double largest_rise(double most) const;
 
   const CertifiedPath* path_ = nullptr;
   ReferenceState state_;
   bool started_ = false;
+  double rate_change_ = 0.0;  ///< ρ̇ [1/s]
   timing::TimedPath::Cursor cursor_;
 };
 

@@ -24,11 +24,11 @@ void FailSafe::set_at_rest(const VectorXd& q) {
 }
 
 void FailSafe::set_path_stop(const CertifiedPath& path, const PathStop::Place& from,
-                             const VectorXd& e, const VectorXd& e_rate,
+                             const PathStop::Deviation& deviation, double braking,
                              const PathStop::Bounds& bounds) {
   move_s_ = 0.0;
   along_path_ = true;
-  path_stop_.set(path, from, e, e_rate, bounds);
+  path_stop_.set(path, from, deviation, braking, bounds);
 }
 
 void FailSafe::set_move(const VectorXd& target, double duration_s) {

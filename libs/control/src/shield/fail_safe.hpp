@@ -18,7 +18,7 @@ class FailSafe {
                 const StopMotion::Braking& braking);
   /// A stop along a path, as PathStop::set().
   void set_path_stop(const CertifiedPath& path, const PathStop::Place& from,
-                     const Eigen::VectorXd& e, const Eigen::VectorXd& e_rate,
+                     const PathStop::Deviation& deviation, double braking,
                      const PathStop::Bounds& bounds);
   /// At rest from the start.
   void set_at_rest(const Eigen::VectorXd& q);

@@ -18,7 +18,7 @@ constexpr double less = 0.5, least_share = 0.2;
 PathProof::PathProof(const model::Model& model, const scene::Levers& levers,
                      const scene::SelfField* self)
     : levers_(levers), lines_(model, self), kept_(VectorXd::Ones(intervals_max)) {
-  for (auto* x : {&q0_, &q1_, &v_, &a_, &bend_}) x->setZero(model.dof());
+  for (auto* x : {&q0_, &q1_, &bend_}) x->setZero(model.dof());
 }
 
 void PathProof::set(const CertifiedPath* path) {
@@ -40,16 +40,8 @@ void PathProof::forget(const scene::Environment& environment, double time_s, Ind
 
 // docs/theory.md (14.35): an interval is proved by its chord, with what the curve strays from it.
 void PathProof::begin() {
-  const timing::TimedPath& motion = path_->motion;
-  const double from = motion.place[end_], to = motion.place[end_ + 1];
-  const Index piece = motion.curve.at(0.5 * (from + to), q0_, v_, a_);
-  motion.curve.bound_bend(piece, from, to, bend_);
-  motion.curve.at(from, q0_, v_, a_);
-  motion.curve.at(to, q1_, v_, a_);
-  bend_ *= 0.125 * (to - from) * (to - from);
-  double stray = 0.0;
-  for (const Eigen::MatrixXd* levers : {&levers_.shapes(), &levers_.pairs()})
-    for (Index s = 0; s < levers->rows(); ++s) stray = std::max(stray, levers->row(s).dot(bend_));
+  path_->motion.chord(end_, q0_, q1_, bend_);
+  const double stray = levers_.reach(bend_);
   search::Margins margins(share_ * path_->clearance_m[end_] + stray);
   margins.set_self_most(share_ * path_->self_m[end_] + stray);
   lines_.set_margins(margins);

@@ -45,7 +45,7 @@ class PathProof {
   bool again_ = false, blocked_ = false, open_ = false;
   double share_ = 1.0;    ///< of the margin that is asked for
   Eigen::VectorXd kept_;  ///< share of the margins that is proved, per interval
-  Eigen::VectorXd q0_, q1_, v_, a_, bend_;
+  Eigen::VectorXd q0_, q1_, bend_;
 };
 
 }  // namespace hamelin::control

@@ -119,7 +119,8 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       bounded_check_(model, levers_) {
   const Index n = model.dof();
   set_reserve(scene, scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(n));
-  for (auto* x : {&line_stray_, &zero_, &way_, &hold_, &path_q_, &path_v_, &path_a_, &e_, &e_rate_})
+  for (auto* x : {&line_stray_, &zero_, &way_, &hold_, &path_q_, &path_v_, &path_a_, &e_, &e_rate_,
+                  &e_acceleration_})
     x->setZero(n);
   path_effort_ = torque_share_ * limits_.effort_max;
   aside_ = zero_;

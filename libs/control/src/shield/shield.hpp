@@ -122,6 +122,9 @@ class Shield {
   [[nodiscard]] bool verify_path(const Step& step);
   /// The place of the path near a node, and the node's deviation from it, in e_ and e_rate_.
   [[nodiscard]] PathStop::Place project(const Node& node, const PathStop::Place& near);
+  /// The β with which an arm passes a place, by its acceleration, and the rest of that in
+  /// e_acceleration_, where accelerations may not jump; else zero.
+  [[nodiscard]] double braking_at(const PathStop::Place& place, const Step& step);
   /// Whether an arm that strays from the path by this much keeps the margins and the joint limits.
   [[nodiscard]] bool within_tube(const Straying::Bounds& stray, Eigen::Index first,
                                  Eigen::Index last);
@@ -206,7 +209,7 @@ class Shield {
 
   PathProof path_proof_;
   PathStop::Place path_place_;
-  Eigen::VectorXd path_q_, path_v_, path_a_, e_, e_rate_, path_effort_;
+  Eigen::VectorXd path_q_, path_v_, path_a_, e_, e_rate_, e_acceleration_, path_effort_;
   timing::TimedPath::Cursor path_cursor_;
 
   std::optional<std::uint64_t> snapshot_;  ///< for which the lines' anchors hold

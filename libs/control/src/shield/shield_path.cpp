@@ -15,6 +15,8 @@ namespace {
 constexpr double fade_acceleration_max = 20.0;
 // The same as the straight stop's shortest, in periods.
 constexpr double stop_periods = 4.0;
+// Of a path, slower ones say nothing of an arm's ρ [rad/s or m/s].
+constexpr double least_speed = 0.2;
 
 }  // namespace
 
@@ -34,6 +36,17 @@ PathStop::Place Shield::project(const Node& node, const PathStop::Place& near) {
   return at;
 }
 
+// Of the arm's acceleration, what is along the path counts as braking of ρ if it does not drive it.
+double Shield::braking_at(const PathStop::Place& place, const Step& step) {
+  if (path_proof_.path()->braking_ramp == 0.0) return 0.0;
+  e_acceleration_ = step.acceleration - place.rate * place.rate * path_a_;
+  const double square = path_v_.squaredNorm();
+  if (!(square > least_speed * least_speed)) return 0.0;
+  const double braking = std::max(0.0, -e_acceleration_.dot(path_v_) / square);
+  e_acceleration_ += braking * path_v_;
+  return braking;
+}
+
 // docs/theory.md (14.34): no distance is computed, as the path was proved and the arm is near it.
 bool Shield::verify_path(const Step& step) {
   const PathStop::Place from = project(step.from, path_place_);
@@ -42,7 +55,8 @@ bool Shield::verify_path(const Step& step) {
   const Index first = path_cursor_.node;
   const PathStop::Place to =
       project(step.to, {from.time_s + period_s_ * from.rate, path_place_.rate});
-  tried_.set_path_stop(*path_proof_.path(), to, e_, e_rate_,
+  const double braking = braking_at(to, step);
+  tried_.set_path_stop(*path_proof_.path(), to, {e_, e_rate_, e_acceleration_}, braking,
                        {path_effort_, to.rate / (stop_periods * period_s_)});
   const PathStop& stop = tried_.path_stop();
   refusal_ = {StopCause::torque, {}, -1};

@@ -140,7 +140,7 @@ void Straying::bound(const PathStop& stop) {
   if (has_model_errors()) {
     for (const double share : {0.0, 0.5, 0.9}) {
       stop.path_at(share * stop.braking_s(), q_, velocity_, acceleration_);
-      include_model_errors({q_, velocity_, acceleration_, stop.duration_s(), 0.0});
+      include_model_errors({q_, velocity_, acceleration_, stop.duration_s(), stop.ramp_s()});
     }
     bounds_.errors *= between_examined;
     bounds_.shapes *= between_examined;

@@ -14,6 +14,13 @@ struct ReferenceState {
   double error = 0.0;       ///< largest distance of a joint from q [rad or m]
   bool ended = false;       ///< whether time_s is the trajectory's end
   bool certified = false;   ///< whether it is that of a path which is proved to be clear
+
+  /// The rate of the clock for an error: full while no joint is farther from the reference than
+  /// `tracked_within`, and zero beyond `left_beyond` [rad or m]; docs/theory.md (18.16).
+  [[nodiscard]] static double rate_for(double error) noexcept;
+  static constexpr double tracked_within = 0.02, left_beyond = 0.1;
+  /// Makes velocity and acceleration at full rate those at `rate`, which changes by so much [1/s].
+  void slow_down(double rate_change);
 };
 
 /// The reference of a trajectory goal from tick to tick, docs/theory.md (18.16). It belongs to the

@@ -20,6 +20,9 @@ class Levers {
   /// SelfField::pairs() × dof.
   [[nodiscard]] const Eigen::MatrixXd& pairs() const noexcept { return pairs_; }
 
+  /// How far a deviation of the joints moves any shape, or two parts to each other, at most [m].
+  [[nodiscard]] double reach(const Eigen::VectorXd& deviation) const;
+
   /// Extends the travel of prismatic joints, on which the levers of the joints before them depend,
   /// if one of them may reach beyond it. @param stray how far each joint may be from q
   void extend_travel(const Eigen::VectorXd& q, const Eigen::VectorXd& stray);

@@ -55,8 +55,6 @@ class Blending {
   void widen(BlendedPath& path, const search::Margins& margins, search::Query& query);
   /// By how much the curve may be nearer to something than the margins, in the worst case [m].
   static constexpr double loss_m = 5e-4;
-  /// How far a deviation of the joints moves any part of the arm, or two parts to each other [m].
-  [[nodiscard]] double reach(const Eigen::VectorXd& deviation) const;
 
  private:
   [[nodiscard]] bool is_clear(const BlendedPath& path, Eigen::Index point,

@@ -34,10 +34,12 @@ class Curve {
                   Eigen::Index first = 0) const;
   /// Whether the tangent is the same on both sides of all places where pieces meet, to rounding.
   [[nodiscard]] bool is_smooth() const;
-  /// Bounds |q″| of each joint between two places of one piece.
-  void bound_bend(Eigen::Index piece, double from, double to, Eigen::VectorXd& bend) const;
+  /// Bounds |q″| of each joint between two places.
+  void bound_bend(double from, double to, Eigen::VectorXd& bend) const;
 
  private:
+  /// Raises it to the bound on one piece.
+  void include_bend(Eigen::Index piece, double from, double to, Eigen::VectorXd& bend) const;
   [[nodiscard]] const double* coefficient(Eigen::Index piece, int power) const {
     return coefficients_.data() + (piece * (degree_ + 1) + power) * dof();
   }

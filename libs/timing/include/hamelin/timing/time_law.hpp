@@ -14,13 +14,19 @@ struct Limits {
   Eigen::VectorXd velocity;      ///< [rad/s or m/s]
   Eigen::VectorXd acceleration;  ///< [rad/s² or m/s²]; always given
   Eigen::VectorXd torque;        ///< [Nm or N]
+  /// Rates of change; where neither is bounded, accelerations jump.
+  Eigen::VectorXd jerk;         ///< [rad/s³ or m/s³]
+  Eigen::VectorXd torque_rate;  ///< [Nm/s or N/s]
+  [[nodiscard]] bool have_rates() const noexcept {
+    return jerk.size() > 0 || torque_rate.size() > 0;
+  }
 };
 
 /// The fastest motion along a curve within the limits, from a speed to rest: docs/theory.md
-/// (19.5)–(19.9), by two passes over the squared speed as in H. Pham, Q.-C. Pham, A New Approach
+/// (19.5)–(19.11), by two passes over the squared speed as in H. Pham, Q.-C. Pham, A New Approach
 /// to Time-Optimal Path Parameterization Based on Reachability Analysis, IEEE Transactions on
 /// Robotics 34(3), 2018, with the limits kept at both ends of each interval and examined between
-/// them. One thread.
+/// them. Where rates are bounded, that motion is averaged over a window of time. One thread.
 class TimeLaw {
  public:
   /// How densely a curve is examined.
@@ -35,20 +41,17 @@ class TimeLaw {
   /// Deleted: a temporary model is gone before any call could use it.
   TimeLaw(const model::Model&& model, Limits limits) = delete;
 
-  /// What a motion along a curve begins with.
-  struct Start {
-    double speed = 0.0;      ///< dσ/dt
-    double speed_max = 0.0;  ///< of the whole motion; zero: no bound
-  };
   /// @param out its curve is given, the rest is set
+  /// @param speed dσ/dt at the beginning; zero where rates are bounded
   /// @return whether there is a motion; else see cause()
-  [[nodiscard]] bool solve(TimedPath& out, const Start& start);
-  [[nodiscard]] bool solve(TimedPath& out) { return solve(out, {}); }
-  /// The duration of that motion, from rest and without an examination between the nodes; infinite
-  /// if there is none.
+  [[nodiscard]] bool solve(TimedPath& out, double speed = 0.0);
+  /// The duration of the motion from rest if rates are not bounded, and without an examination
+  /// between the nodes; infinite if there is none.
   [[nodiscard]] double duration_s(const Curve& curve);
   /// One line: why the last call found no motion.
   [[nodiscard]] std::string_view cause() const noexcept { return cause_; }
+  /// At how many places of the curve the last call has evaluated torques.
+  [[nodiscard]] long evaluated() const noexcept { return evaluated_; }
   [[nodiscard]] const Limits& limits() const noexcept { return limits_; }
 
  private:
@@ -59,33 +62,51 @@ class TimeLaw {
   struct Range {
     double low, high;
   };
+  /// q′, q″ and, of (19.4), A, B and g at places of a curve.
+  struct Rows {
+    dynamics::StatesXd tangent, curvature, inertia, bias, gravity;
+  };
   void set_nodes(const Curve& curve);
   void add_nodes(double from, double to, Eigen::Index count);
-  /// Inertia, bias and gravity at places of the curve.
-  void evaluate(const Curve& curve, const Eigen::VectorXd& places);
+  /// @param torques whether A, B and g are needed
+  void evaluate(const Curve& curve, const Eigen::VectorXd& places, bool torques, Rows& out);
   /// The rows of one interval; tightens the bound of x.
-  void set_lines(Eigen::Index interval, double share, double& x_max);
+  void set_lines(Eigen::Index interval, double& x_max);
   void add_lines(Eigen::Index node, double lead, double share, double& x_max);
   [[nodiscard]] Range range(double x) const;
   [[nodiscard]] double largest(double x_max) const;
-  [[nodiscard]] bool pass(TimedPath& out, const Start& start, double share);
-  [[nodiscard]] bool backward(const Start& start, double share);
-  [[nodiscard]] bool forward(TimedPath& out, const Start& start, double share);
-  /// By how much limits are exceeded between the nodes, as a factor.
-  [[nodiscard]] double excess(const TimedPath& motion);
+  /// The two passes, with shares_ of the limits.
+  [[nodiscard]] bool pass(TimedPath& out, double speed);
+  [[nodiscard]] bool backward();
+  [[nodiscard]] bool forward(TimedPath& out, double speed);
+  [[nodiscard]] bool solve_with_jumps(TimedPath& out, double speed);
+  [[nodiscard]] bool solve_with_ramps(TimedPath& out);
+  /// What the motion uses of its limits on an interval, as factors; ramp: by d³σ/dt³ alone.
+  struct Used {
+    double values = 0.0, rates = 0.0, ramp = 0.0;
+  };
+  [[nodiscard]] Used used(const TimedPath& motion, Eigen::Index interval, const Rows& nodes) const;
+  /// Sets between_ to what holds in the middle of the intervals.
+  void evaluate_between(const TimedPath& motion);
+  /// Lowers the shares for what contributes to an interval of the averaged motion.
+  void lower_shares(const TimedPath& averaged, Eigen::Index interval, double window_s,
+                    double factor);
+  static void store(const Rows& nodes, TimedPath& out);
 
   const model::Model& model_;
   Limits limits_;
   Grid grid_;
   dynamics::BatchWorkspace ws_;
   std::string_view cause_;
+  long evaluated_ = 0;
   std::vector<double> nodes_;
-  Eigen::VectorXd places_, between_, squared_max_, controllable_;
-  dynamics::StatesXd q_, dq_, ddq_, inertia_, bias_, gravity_, zero_;
-  dynamics::StatesXd mid_dq_, mid_ddq_, mid_inertia_, mid_bias_, mid_gravity_;
+  Eigen::VectorXd places_, squared_max_, controllable_;
+  Eigen::VectorXd shares_;  ///< of the limits, that the passes use on each interval
+  Eigen::VectorXd lowered_;
+  Rows rows_, between_, averaged_;
+  dynamics::StatesXd q_, zero_;
   std::vector<Line> lines_;
-  bool keeps_dynamics_ = true;  ///< although torques are not limited
-  TimedPath trial_;             ///< of duration_s(), without a curve
+  TimedPath trial_;  ///< without a curve
 };
 
 }  // namespace hamelin::timing

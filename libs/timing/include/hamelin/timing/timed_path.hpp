@@ -6,14 +6,15 @@
 
 namespace hamelin::timing {
 
-/// A motion along a curve: σ(t) has a constant second derivative between nodes,
-/// docs/theory.md (19.5). It ends at rest.
+/// A motion along a curve: the third derivative of σ(t) is constant between nodes, and zero where
+/// accelerations may jump; docs/theory.md (19.5), (19.10). It ends at rest.
 struct TimedPath {
   Curve curve;
   Eigen::VectorXd place;   ///< σ of each node
   Eigen::VectorXd time_s;  ///< t of each node, from 0
   Eigen::VectorXd speed;   ///< dσ/dt there
   Eigen::VectorXd rate;    ///< d²σ/dt² behind each node but the last
+  Eigen::VectorXd ramp;    ///< d³σ/dt³ there
   /// Torques that move the arm along the curve are inertia · d²σ/dt² + bias · (dσ/dt)² + gravity:
   /// M q′, M q″ + C(q, q′) q′ and ∂U at each node, dof × nodes [Nm or N]; docs/theory.md (19.4).
   Eigen::MatrixXd inertia, bias, gravity;
@@ -22,6 +23,14 @@ struct TimedPath {
   [[nodiscard]] bool empty() const noexcept { return place.size() == 0; }
   [[nodiscard]] Eigen::Index nodes() const noexcept { return place.size(); }
   [[nodiscard]] double duration_s() const { return time_s[nodes() - 1]; }
+  /// d²σ/dt² before the node behind an interval.
+  [[nodiscard]] double rate_at_end(Eigen::Index interval) const {
+    return rate[interval] + ramp[interval] * (time_s[interval + 1] - time_s[interval]);
+  }
+  /// The straight line between the ends of an interval, and by how much the curve strays from it at
+  /// most, per joint. No allocation if the vectors have dof numbers.
+  void chord(Eigen::Index interval, Eigen::VectorXd& from, Eigen::VectorXd& to,
+             Eigen::VectorXd& stray) const;
   /// Where a motion is.
   struct Cursor {
     Eigen::Index node = 0, piece = 0;  ///< the last ones that it passed
