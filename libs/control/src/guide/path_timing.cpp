@@ -16,7 +16,7 @@ namespace {
 
 // Shares of the limits that a motion uses. The rest is for what keeps the arm on it.
 constexpr double speed_share = 0.99, acceleration_share = 14.0 / 15.0, torque_share_most = 0.9,
-                 torque_share_kept = 0.04;
+                 torque_share_kept = 0.04, least_torque_share = 0.01;
 constexpr double default_acceleration = 15.0;  // [rad/s² or m/s²]
 // Changes of way-points that are tried, what each costs besides proofs in checks, and what these
 // may cost; fewer where checks take longer than so [s]: the arm waits for them.
@@ -26,8 +26,8 @@ constexpr long checks_per_try = 5;
 // the braking; and the largest such change, where the bounds do not say it [1/s²].
 constexpr double rate_share = 0.5, ramp_share = 0.2, whole_rate = 0.9, braking_ramp_most = 2000.0;
 constexpr double infinity = std::numeric_limits<double>::infinity();
-// Intervals that keep less are examined again [m].
-constexpr double enough_m = 0.004;
+// Intervals that keep less than what is enough are examined again [m].
+constexpr double least_enough_m = 0.004;
 // Factors of such a margin that are tried.
 constexpr std::array<double, 3> higher{4.0, 2.5, 1.6};
 // Places at which torques are evaluated, that cost as much as a check.
@@ -56,18 +56,24 @@ timing::Limits path_limits(const scene::Scene& scene, const model::Model& model,
   out.jerk = rate_share * changes.jerk_max;
   if (changes.torque_rate > 0.0)
     out.torque_rate = VectorXd::Constant(model.dof(), rate_share * changes.torque_rate);
-  const double share =
-      std::min(torque_share_most, scene::safety_bounds(scene).torque_share - torque_share_kept);
+  // what is unknown of friction and masses is left to what keeps the arm on its way
+  const scene::SafetyBounds unknown = scene::safety_bounds(scene);
+  const double share = std::max(
+      least_torque_share,
+      std::min(torque_share_most, unknown.torque_share - torque_share_kept) - unknown.friction_share);
+  out.acceleration *= 1.0 - unknown.mass_error;
   out.torque = share * modelled.effort_max;
   return out;
 }
 
 PathTiming::PathTiming(const scene::Scene& scene, const model::Model& model,
                        const scene::SelfField* self, const timing::Limits& limits,
-                       VectorXd stop_acceleration, const search::Settings& settings)
+                       VectorXd stop_acceleration, double enough_m,
+                       const search::Settings& settings)
     : model_(model),
       limits_(limits),
       stop_acceleration_(std::move(stop_acceleration)),
+      enough_m_(std::max(enough_m, least_enough_m)),
       levers_(model, self),
       blending_(levers_),
       way_points_(model, levers_, limits, settings.q_lower, settings.q_upper),
@@ -131,18 +137,29 @@ void PathTiming::set_margins(CertifiedPath& out, const search::Margins& margins)
 
 void PathTiming::raise_margins(CertifiedPath& out, search::Query& query) {
   for (Index k = 0; k + 1 < out.motion.nodes(); ++k) {
-    if (std::min(out.clearance_m[k], out.self_m[k]) >= enough_m) continue;
+    double &clearance = out.clearance_m[k], &self = out.self_m[k];
+    if (std::min(clearance, self) >= enough_m_) continue;
     out.motion.chord(k, from_, to_, stray_);
     const double stray = levers_.reach(stray_);
-    for (const double factor : higher) {
-      const auto raised = [&](double m) { return std::max(m, std::min(enough_m, factor * m)); };
-      const double clearance = raised(out.clearance_m[k]), self = raised(out.self_m[k]);
-      search::Margins margins(clearance + stray);
-      margins.set_self_most(self + stray);
+    const auto keeps = [&](double of_obstacles, double of_self) {
+      search::Margins margins(of_obstacles + stray);
+      margins.set_self_most(of_self + stray);
       query.set_margins(margins);
-      if (!query.motion_clear(from_, to_)) continue;
-      out.clearance_m[k] = clearance;
-      out.self_m[k] = std::min(self, clearance);
+      return query.motion_clear(from_, to_);
+    };
+    const auto raised = [&](double m, double factor) { return std::min(enough_m_, factor * m); };
+    for (const double factor : higher) {
+      const double more = std::max(clearance, raised(clearance, factor)),
+                   more_of_self = std::max(self, std::min(more, raised(self, factor)));
+      if (!keeps(more, more_of_self)) continue;
+      clearance = more;
+      self = more_of_self;
+      break;
+    }
+    for (const double factor : higher) {
+      const double more = raised(clearance, factor);
+      if (!(more > clearance) || !keeps(more, self)) continue;
+      clearance = more;
       break;
     }
   }
@@ -219,11 +236,11 @@ void PathTiming::bound_braking(CertifiedPath& out, Index k) const {
 void PathTiming::set_mass(CertifiedPath& out) {
   MatrixXd M(model_.dof(), model_.dof());
   VectorXd q(model_.dof()), unused(q);
-  out.mass = VectorXd::Zero(model_.dof());
+  out.mass = MatrixXd::Zero(model_.dof(), model_.dof());
   for (int k = 0; k < mass_places; ++k) {
     out.motion.curve.at(out.motion.curve.end() * k / (mass_places - 1), q, unused, unused);
     dynamics::mass_matrix(model_, ws_, q, M);
-    out.mass = out.mass.cwiseMax(mass_between * M.cwiseAbs().rowwise().sum());
+    out.mass = out.mass.cwiseMax(mass_between * M.cwiseAbs());
   }
 }
 

@@ -28,9 +28,10 @@ class PathTiming {
  public:
   /// @param model kept by reference @param self null if self-collision is not modelled
   /// @param stop_acceleration what stops may use; of size zero: no bound
+  /// @param enough_m margin beyond which a path need not be proved
   /// @param settings of the search, for the joint limits that way-points keep
   PathTiming(const scene::Scene& scene, const model::Model& model, const scene::SelfField* self,
-             const timing::Limits& limits, Eigen::VectorXd stop_acceleration,
+             const timing::Limits& limits, Eigen::VectorXd stop_acceleration, double enough_m,
              const search::Settings& settings);
 
   /// Begins with the paths to a goal. @param number of the search, for random numbers
@@ -61,6 +62,7 @@ class PathTiming {
   const model::Model& model_;
   timing::Limits limits_;
   Eigen::VectorXd stop_acceleration_;
+  double enough_m_;
   scene::Levers levers_;
   timing::Blending blending_;
   timing::WayPoints way_points_;

@@ -9,9 +9,10 @@ namespace hamelin::control {
 using Eigen::VectorXd;
 
 ChangeBounds DriveOptions::changes(const scene::Scene& scene) const {
-  if (kind == DriveKind::position) return {0.0, acceleration_max, jerk_max};
   if (kind == DriveKind::ideal) return {};
-  return {scene.actuation.torque_rate_max_Nm_s.value_or(0.0), {}, {}};
+  const double torque_rate = scene.actuation.torque_rate_max_Nm_s.value_or(0.0);
+  if (kind == DriveKind::torque) return {torque_rate, {}, {}};
+  return {torque_rate, acceleration_max, jerk_max};
 }
 
 std::unique_ptr<Drive> make_drive(const scene::Scene& scene, const model::Model& model,

@@ -60,6 +60,9 @@ long other_checks(const scene::GuideSpec& spec) {
   return std::lround(spec.check_time_s * most > most_s ? most_s / spec.check_time_s : most);
 }
 
+// What a stop along a path may need of the margins, by what an arm at rest needs.
+constexpr double tube_share = 2.5;
+
 }  // namespace
 
 std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, const Json& params,
@@ -72,7 +75,9 @@ std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, co
   if (arm.plugin.follows_trajectories())
     timing = std::make_unique<PathTiming>(scene, model, view.self_field(),
                                           path_limits(scene, model, reserve, params, changes),
-                                          changes.acceleration_max, settings);
+                                          changes.acceleration_max,
+                                          tube_share * std::max(reserve.obstacles_m, reserve.self_m),
+                                          settings);
   return std::make_unique<GuideSearch>(
       model, arm.world, view, settings, std::move(timing), other_checks(scene.guide),
       static_cast<Eigen::Index>(arm.path_points_max), arm.guide_thread);

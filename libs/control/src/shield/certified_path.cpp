@@ -23,7 +23,7 @@ constexpr int passes = 2;
 }  // namespace
 
 PathStop::PathStop(Index dof) {
-  for (auto* x : {&e_, &slope_, &bend_, &widest_, &end_, &effort_, &acceleration_, &v_, &a_})
+  for (auto* x : {&e_, &slope_, &bend_, &widest_, &fade_, &end_, &effort_, &acceleration_, &v_, &a_})
     x->setZero(dof);
   square_ = bound_ = VectorXd::Zero(static_cast<Index>(pieces_max));
   pieces_.reserve(pieces_max);
@@ -80,16 +80,14 @@ void PathStop::set_deviation(const Deviation& deviation, bool jumps) {
   widest_ = e_.cwiseAbs() + slope_.cwiseAbs() / (w * e_number);
   if (jumps) {
     bend_.setZero();
-    fade_acceleration_ = w * (w * e_.cwiseAbs() + 2.0 * deviation.rate.cwiseAbs()).maxCoeff();
+    fade_ = w * (w * e_.cwiseAbs() + 2.0 * deviation.rate.cwiseAbs());
     return;
   }
   constexpr double square = 2.0 / (e_number * e_number);  // the most of x² e^{−x}/2
   bend_ = deviation.acceleration + 2.0 * w * deviation.rate + w * w * e_;
   widest_ += square / (w * w) * bend_.cwiseAbs();
-  fade_acceleration_ = (deviation.acceleration.cwiseAbs() +
-                        (w * slope_ - 2.0 * bend_).cwiseAbs() / e_number +
-                        square * bend_.cwiseAbs())
-                           .maxCoeff();
+  fade_ = deviation.acceleration.cwiseAbs() +
+          w * (w * slope_ - 2.0 * bend_).cwiseAbs() / (w * e_number) + square * bend_.cwiseAbs();
 }
 
 void PathStop::set(const CertifiedPath& path, const Place& from, const Deviation& deviation,
@@ -98,9 +96,9 @@ void PathStop::set(const CertifiedPath& path, const Place& from, const Deviation
   const bool jumps = path.braking_ramp == 0.0;
   set_deviation(deviation, jumps);
   effort_ = bounds.effort_max;
-  if (effort_.size() > 0) effort_ -= fade_acceleration_ * path.mass;
+  if (effort_.size() > 0) effort_.noalias() -= path.mass * fade_;
   acceleration_ = path.stop_acceleration;
-  acceleration_.array() -= fade_acceleration_;
+  if (acceleration_.size() > 0) acceleration_ -= fade_;
   rate_max_ = bounds.rate_max;
   const timing::TimedPath& motion = path.motion;
   cursor_ = {};

@@ -25,8 +25,8 @@ struct CertifiedPath {
   /// and its bound at each node [1/s]: docs/theory.md (14.37). Else zero, and of size zero.
   double braking_ramp = 0.0;
   Eigen::VectorXd braking_max;
-  /// Sums of the rows of |M|, the largest on the path: bounds of torques per acceleration.
-  Eigen::VectorXd mass;
+  /// The largest |M| on the path: bounds of torques per acceleration, dof × dof.
+  Eigen::MatrixXd mass;
   std::uint64_t snapshot = 0;  ///< of the world for which it is proved
 };
 
@@ -67,8 +67,8 @@ class PathStop {
   [[nodiscard]] double ramp_s() const noexcept { return ramp_s_; }
   /// Bound of |δ| per joint, at all times.
   [[nodiscard]] const Eigen::VectorXd& widest() const noexcept { return widest_; }
-  /// Bound of the acceleration by which the deviation fades, the largest of all joints.
-  [[nodiscard]] double fade_acceleration() const noexcept { return fade_acceleration_; }
+  /// Bound of the acceleration by which the deviation fades, of each joint.
+  [[nodiscard]] const Eigen::VectorXd& fade_acceleration() const noexcept { return fade_; }
   /// The first and the last interval that it passes.
   [[nodiscard]] Eigen::Index first() const noexcept { return first_; }
   [[nodiscard]] Eigen::Index last() const noexcept { return last_; }
@@ -96,9 +96,9 @@ class PathStop {
 
   const CertifiedPath* path_ = nullptr;
   std::vector<Piece> pieces_;
-  double rate_max_ = 0.0, braking_s_ = 0.0, duration_s_ = 0.0, fade_acceleration_ = 0.0;
+  double rate_max_ = 0.0, braking_s_ = 0.0, duration_s_ = 0.0;
   double ramp_s_ = 0.0;
-  Eigen::VectorXd e_, slope_, bend_, widest_, end_, effort_, acceleration_;
+  Eigen::VectorXd e_, slope_, bend_, widest_, fade_, end_, effort_, acceleration_;
   Eigen::VectorXd square_, bound_;  ///< bounds of ρ² and β at each node
   mutable Eigen::VectorXd v_, a_;
   mutable timing::TimedPath::Cursor cursor_;

@@ -60,7 +60,7 @@ bool Shield::verify_path(const Step& step) {
                        {path_effort_, to.rate / (stop_periods * period_s_)});
   const PathStop& stop = tried_.path_stop();
   refusal_ = {StopCause::torque, {}, -1};
-  if (stop.fade_acceleration() > fade_acceleration_max) return false;
+  if (stop.fade_acceleration().maxCoeff() > fade_acceleration_max) return false;
   if (!path_proof_.covers(first, stop.last())) return false;
   straying_.bound(stop);
   // the step itself, between its ends
@@ -80,17 +80,14 @@ bool Shield::within_tube(const Straying::Bounds& stray, Index first, Index last)
           refusal_ = {StopCause::joint_limit, {}, static_cast<int>(j)};
           return false;
         }
-  double most = 0.0, pairs = 0.0, addition = 0.0;
-  for (Index s = 0; s < levers_.shapes().rows(); ++s) {
-    const double shape = stray.shapes.size() > 0 ? stray.shapes[s] : 0.0;
-    most = std::max(most, levers_.shapes().row(s).dot(stray.tracking) + shape);
-    addition = std::max(addition, shape);
-  }
-  for (Index p = 0; p < levers_.pairs().rows(); ++p)
-    pairs = std::max(pairs, levers_.pairs().row(p).dot(stray.tracking));
+  double most = 0.0;
+  for (Index s = 0; s < levers_.shapes().rows(); ++s)
+    most = std::max(most, levers_.shapes().row(s).dot(stray.tracking) +
+                              (stray.shapes.size() > 0 ? stray.shapes[s] : 0.0));
   if (most + margin_m_ < path_proof_.clearance_m(first, last) &&
-      (levers_.pairs().rows() == 0 ||
-       pairs + 2.0 * addition + margin_m_ < path_proof_.self_m(first, last)))
+      (self_ == nullptr ||
+       stop_line_.largest_pair_stray({stray.tracking, stray.shapes, margin_m_}) <
+           path_proof_.self_m(first, last)))
     return true;
   refusal_ = {StopCause::map, {0, scene::Contact::map, -1, 0.0}, -1};
   return false;
