@@ -25,6 +25,9 @@ class GuideQuery final : public search::Query {
   /// @return its number
   std::uint64_t refresh(double time_s);
 
+  /// WorldSnapshot::standing of the snapshot.
+  [[nodiscard]] std::uint64_t standing() const noexcept { return query_.snapshot().standing; }
+
   [[nodiscard]] double clearance(const Eigen::VectorXd& q, double at_least_m) override;
   [[nodiscard]] double self_clearance(const Eigen::VectorXd& q, double most_m) override {
     ++clearances_;

@@ -73,7 +73,7 @@ void GuideSearch::find(GuideAnswer& out) {
   find_others(problem, out);
   out.motion = timing_->make(query_);
   if (out.motion) {
-    out.motion->snapshot = out.snapshot;
+    out.motion->standing = query_.standing();
     out.path.points = timing_->points();
     out.path.length = search::path_length(out.path.points);
   }

@@ -225,11 +225,14 @@ void PathTiming::bound_braking(CertifiedPath& out, Index k) const {
     if (limits_.jerk.size() > 0) bound(motion.tangent, motion.curvature, limits_.jerk[j], j);
     if (limits_.torque_rate.size() > 0)
       bound(motion.inertia, motion.bias, limits_.torque_rate[j], j);
-    // at rest
-    if (limits_.torque.size() == 0) continue;
-    const double left = limits_.torque[j] - std::abs(motion.gravity(j, k)),
-                 slope = std::abs(motion.inertia(j, k)) * motion.speed[k];
-    if (slope * most > left) most = std::max(0.0, left / slope);
+    // at rest, where the motion itself needs nothing
+    const auto bound_at_rest = [&](double left, double slope) {
+      if (slope * most > left) most = std::max(0.0, left / slope);
+    };
+    if (limits_.torque.size() > 0)
+      bound_at_rest(limits_.torque[j] - std::abs(motion.gravity(j, k)),
+                    std::abs(motion.inertia(j, k)) * motion.speed[k]);
+    bound_at_rest(limits_.acceleration[j], std::abs(motion.tangent(j, k)) * motion.speed[k]);
   }
 }
 

@@ -244,7 +244,7 @@ const Shield* Controller::shield() const noexcept {
 }
 
 Surroundings Controller::surroundings() const noexcept {
-  return {arm_->view.environment(), arm_->view.snapshot(), time_s_};
+  return {arm_->view.environment(), arm_->view.snapshot(), time_s_, arm_->view.standing()};
 }
 
 WorldView& Controller::view() noexcept {

@@ -215,7 +215,8 @@ void Controller::describe_defect(LoadedArm& fresh, LineBuffer& line) {
     if (fresh.view.touching()) fresh.view.describe_contact(line);
     return;
   }
-  const Shield::Surroundings world{fresh.view.environment(), fresh.view.snapshot(), time_s_.load()};
+  const Shield::Surroundings world{fresh.view.environment(), fresh.view.snapshot(), time_s_.load(),
+                                   fresh.view.standing()};
   if (!shielded_ ||
       fresh.shield->start_in_place_of(*arm_->shield, world, node, fresh.drive->stop_start()))
     return;

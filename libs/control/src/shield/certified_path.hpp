@@ -27,7 +27,7 @@ struct CertifiedPath {
   Eigen::VectorXd braking_max;
   /// The largest |M| on the path: bounds of torques per acceleration, dof × dof.
   Eigen::MatrixXd mass;
-  std::uint64_t snapshot = 0;  ///< of the world for which it is proved
+  std::uint64_t standing = 0;  ///< WorldSnapshot::standing of the world for which it is proved
 };
 
 /// A motion to rest along a certified path, from near it: docs/theory.md (14.31)–(14.33). Where

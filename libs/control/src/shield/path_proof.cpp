@@ -29,12 +29,16 @@ void PathProof::set(const CertifiedPath* path) {
   kept_.setOnes();
 }
 
-void PathProof::forget(const scene::Environment& environment, double time_s, Index first) {
-  if (path_ == nullptr) return;
+void PathProof::see(const scene::Environment& environment, double time_s) {
   lines_.set_environment(environment, time_s, false);
+  open_ = false;
+}
+
+void PathProof::forget(const scene::Environment& environment, double time_s, Index first) {
+  see(environment, time_s);
   first_ = end_ = first;
-  again_ = true;
-  blocked_ = open_ = false;
+  again_ = path_ != nullptr;
+  blocked_ = false;
   share_ = 1.0;
 }
 
@@ -50,7 +54,7 @@ void PathProof::begin() {
 }
 
 void PathProof::advance(long checks) {
-  if (path_ == nullptr || !again_ || blocked_) return;
+  if (!again_ || blocked_) return;
   const long since = lines_.checks();
   for (long rest = checks; rest > 0 && end_ < path_->clearance_m.size();
        rest = checks - (lines_.checks() - since)) {

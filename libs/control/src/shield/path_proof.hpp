@@ -19,7 +19,10 @@ class PathProof {
   /// Another path, proved as it says; null: none. The path must stay.
   void set(const CertifiedPath* path);
   [[nodiscard]] const CertifiedPath* path() const noexcept { return path_; }
-  /// The world has changed: what is proved of the path is void. @param first interval of the arm
+  /// The world is another one now, in which the same stands still. It must stay until the next one.
+  void see(const scene::Environment& environment, double time_s);
+  /// The same where what stands still has changed: what is proved of the path is void.
+  /// @param first interval of the arm
   void forget(const scene::Environment& environment, double time_s, Eigen::Index first);
   /// Goes on with the proof, for about so many checks.
   void advance(long checks);

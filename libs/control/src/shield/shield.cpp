@@ -36,6 +36,8 @@ constexpr double smallest_m = 1e-9;
 constexpr double move_speed_share = 0.8;
 // So many checks of a path's proof are made per step after the world has changed.
 constexpr long path_checks = 16;
+// Chords of a stop along a path where it is examined whether something has come in its way.
+constexpr int path_chords = 16;
 // Velocities may exceed their limit by rounding.
 constexpr double velocity_rounding = 1e-9;
 
@@ -143,6 +145,11 @@ void Shield::notice(const Surroundings& world) {
   for (const auto& obstacle : world.environment.obstacles())
     if (scene::exists(obstacle, world.time_s)) ++existing;
   if (snapshot_ == world.snapshot && existing == existing_) return;
+  if (standing_ != world.standing || existing != existing_)
+    path_proof_.forget(world.environment, world.time_s, path_cursor_.node);
+  else
+    path_proof_.see(world.environment, world.time_s);
+  standing_ = world.standing;
   changed_ = snapshot_.has_value();
   snapshot_ = world.snapshot;
   existing_ = existing;
@@ -151,7 +158,6 @@ void Shield::notice(const Surroundings& world) {
   stop_line_.forget();
   move_line_.forget();
   other_line_.forget();
-  path_proof_.forget(world.environment, world.time_s, path_cursor_.node);
   for (MoverCheck* check :
        {&stop_check_, &move_check_, &other_check_, &force_check_, &bounded_check_})
     check->forget();
@@ -271,15 +277,26 @@ void Shield::count_refusal() {
 
 void Shield::check_overtaken(const Surroundings& world, const Node& node) {
   changed_ = false;
-  const auto blocked = [&](const LineCheck::End& from, const LineCheck::End& to) {
-    return stop_line_
-        .check(ws_, &world.environment, world.time_s, from, to, {zero_, no_addition_, 0.0})
-        .has_value();
+  const FailSafe& motion = stop_.motion();
+  const int chords = motion.along_path() ? path_chords : 1;
+  const double from_s = stop_.time_s(), left_s = std::max(0.0, motion.stop_s() - from_s);
+  bool blocked = false;
+  way_ = node.q;
+  const auto go_to = [&](const VectorXd& q) {
+    const LineCheck::End from = place(way_, arm_from_), to = place(q, arm_end_);
+    blocked = blocked || stop_line_
+                             .check(ws_, &world.environment, world.time_s, from, to,
+                                    {zero_, no_addition_, 0.0})
+                             .has_value();
+    way_ = q;
   };
-  const LineCheck::End from = place(node.q, arm_from_), end = place(stop_.motion().end(), arm_end_);
-  const bool goes_on = stop_.motion().moves() && !stop_.has_stopped();
-  const LineCheck::End turn = goes_on ? place(stop_.motion().stop_end(), arm_line_) : from;
-  if ((goes_on && blocked(from, turn)) || blocked(turn, end)) ++counts_.overtaken;
+  for (int k = 1; k < chords; ++k) {
+    motion.at(from_s + left_s * k / chords, path_q_, path_v_);
+    go_to(path_q_);
+  }
+  if (!stop_.has_stopped()) go_to(motion.stop_end());
+  go_to(motion.end());
+  if (blocked) ++counts_.overtaken;
 }
 
 bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {

@@ -213,6 +213,7 @@ class Shield {
   timing::TimedPath::Cursor path_cursor_;
 
   std::optional<std::uint64_t> snapshot_;  ///< for which the lines' anchors hold
+  std::uint64_t standing_ = 0;             ///< for which the path is proved
   std::size_t existing_ = 0;               ///< obstacles at the last call
   bool changed_ = false;  ///< whether obstacles changed since the stop was verified
   bool stopping_ = false;

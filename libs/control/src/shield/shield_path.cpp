@@ -24,7 +24,8 @@ void Shield::set_path(const CertifiedPath* path, const Surroundings& world) {
   path_proof_.set(path);
   path_cursor_ = {};
   path_place_ = {};
-  if (path != nullptr && path->snapshot != world.snapshot)
+  path_proof_.see(world.environment, world.time_s);
+  if (path != nullptr && path->standing != world.standing)
     path_proof_.forget(world.environment, world.time_s, 0);
 }
 

@@ -144,7 +144,7 @@ World::World(const scene::Scene& scene, const model::Model& model, const Options
   }
   scene_.obstacles.clear();
   publish(make_environment(scene.map, scene.start_q).with_obstacles(std::move(obstacles)),
-          std::move(ids));
+          std::move(ids), Changes::standing);
 }
 
 scene::Environment World::make_environment(const std::optional<scene::MapSpec>& map,
@@ -166,11 +166,13 @@ World::View World::view_of_latest() const {
   return {std::move(snapshot), std::move(scratch)};
 }
 
-std::uint64_t World::publish(scene::Environment environment, std::vector<std::int32_t> ids) {
+std::uint64_t World::publish(scene::Environment environment, std::vector<std::int32_t> ids,
+                             Changes changes) {
   if (options_.prepare) environment.prepare();
   const std::uint64_t number = latest_ ? latest_->number + 1 : 0;
   auto snapshot = std::make_shared<const WorldSnapshot>(
-      WorldSnapshot{number, std::move(environment), std::move(ids)});
+      WorldSnapshot{number, std::move(environment), std::move(ids),
+                    changes == Changes::standing || !latest_ ? number : latest_->standing});
   auto view = std::make_unique<View>(
       View{snapshot, scene::Environment::Scratch(snapshot->environment, shapes_max())});
   {
@@ -195,7 +197,9 @@ std::uint64_t World::set_obstacle(scene::Obstacle obstacle) {
   auto obstacles = latest_->environment.obstacles();
   auto ids = latest_->obstacle_ids;
   std::optional<std::int32_t> replaced;
+  Changes changes = obstacle.motion ? Changes::moving : Changes::standing;
   if (const std::size_t found = find_by_name(obstacles, obstacle.name); found < obstacles.size()) {
+    if (!obstacles[found].motion) changes = Changes::standing;
     obstacles[found] = std::move(obstacle);
     replaced = ids[found];
   } else {
@@ -211,7 +215,7 @@ std::uint64_t World::set_obstacle(scene::Obstacle obstacle) {
     obstacles.push_back(std::move(obstacle));
   }
   const std::uint64_t number =
-      publish(latest_->environment.with_obstacles(std::move(obstacles)), std::move(ids));
+      publish(latest_->environment.with_obstacles(std::move(obstacles)), std::move(ids), changes);
   if (replaced) streams_.erase(*replaced);
   return number;
 }
@@ -221,6 +225,7 @@ std::uint64_t World::move_obstacle(std::string_view name, const geometry::SE3& p
   const std::lock_guard lock(mutex_);
   auto obstacles = latest_->environment.obstacles();
   const std::size_t found = require_name(obstacles, name);
+  const Changes changes = obstacles[found].motion ? Changes::moving : Changes::standing;
   obstacles[found].pose = pose;
   obstacles[found].motion = scene::ObservedMotion{time_s, velocity_m_s};
   if (!velocity_m_s.allFinite() || !std::isfinite(time_s))
@@ -230,7 +235,8 @@ std::uint64_t World::move_obstacle(std::string_view name, const geometry::SE3& p
                             name));
   check_update(obstacles[found]);
   const std::uint64_t number =
-      publish(latest_->environment.with_obstacles(std::move(obstacles)), latest_->obstacle_ids);
+      publish(latest_->environment.with_obstacles(std::move(obstacles)), latest_->obstacle_ids,
+              changes);
   streams_.erase(latest_->obstacle_ids[found]);
   return number;
 }
@@ -254,13 +260,15 @@ std::uint64_t World::observe_obstacle(std::string_view name, const Observation& 
   const std::size_t found = require_name(obstacles, name);
   const std::int32_t id = latest_->obstacle_ids[found];
   scene::Obstacle& obstacle = obstacles[found];
+  const Changes changes = obstacle.motion ? Changes::moving : Changes::standing;
   check_observation(obstacle, observation);
   const MotionEstimator stream = followed(obstacle, id, observation);
   obstacle.pose = observation.pose;
   obstacle.motion = observed_motion(obstacle, stream, observation);
   check_update(obstacle);
   const std::uint64_t number =
-      publish(latest_->environment.with_obstacles(std::move(obstacles)), latest_->obstacle_ids);
+      publish(latest_->environment.with_obstacles(std::move(obstacles)), latest_->obstacle_ids,
+              changes);
   streams_.insert_or_assign(id, stream);
   return number;
 }
@@ -277,10 +285,12 @@ std::uint64_t World::remove_obstacle(std::string_view name) {
   const auto found = static_cast<std::ptrdiff_t>(require_name(obstacles, name));
   auto ids = latest_->obstacle_ids;
   const std::int32_t id = ids[static_cast<std::size_t>(found)];
+  const Changes changes =
+      obstacles[static_cast<std::size_t>(found)].motion ? Changes::moving : Changes::standing;
   obstacles.erase(obstacles.begin() + found);
   ids.erase(ids.begin() + found);
   const std::uint64_t number =
-      publish(latest_->environment.with_obstacles(std::move(obstacles)), std::move(ids));
+      publish(latest_->environment.with_obstacles(std::move(obstacles)), std::move(ids), changes);
   streams_.erase(id);
   return number;
 }
@@ -290,12 +300,12 @@ std::uint64_t World::set_map(const std::optional<scene::MapSpec>& map, const Eig
   const scene::Environment environment = make_environment(map, q.size() > 0 ? q : scene_.start_q);
   const std::lock_guard lock(mutex_);
   return publish(environment.with_obstacles(latest_->environment.obstacles()),
-                 latest_->obstacle_ids);
+                 latest_->obstacle_ids, Changes::standing);
 }
 
 std::uint64_t World::change_map(const scene::MapChangeSpec& change) {
   const std::lock_guard lock(mutex_);
-  return publish(latest_->environment.with_change(change), latest_->obstacle_ids);
+  return publish(latest_->environment.with_change(change), latest_->obstacle_ids, Changes::standing);
 }
 
 std::shared_ptr<const WorldSnapshot> World::latest() const {

@@ -113,6 +113,7 @@ void WorldView::see(World::View& view) {
   scratch_ = &view.scratch;
   ids_ = view.snapshot->obstacle_ids;
   snapshot_ = view.snapshot->number;
+  standing_ = view.snapshot->standing;
   current_ = false;
 }
 

@@ -28,6 +28,8 @@ struct WorldSnapshot {
   /// One per obstacle of the environment: a number that the obstacle keeps for its life and that no
   /// other obstacle of this world gets.
   std::vector<std::int32_t> obstacle_ids;
+  /// The number of the last update that changed the map or an obstacle that stood still.
+  std::uint64_t standing = 0;
 };
 
 /// The surroundings of an arm, which any thread may update while another one uses them. Each update
@@ -118,7 +120,10 @@ class World {
   [[nodiscard]] std::size_t contacts_max() const noexcept { return contacts_max_; }
 
  private:
-  std::uint64_t publish(scene::Environment environment, std::vector<std::int32_t> ids);
+  /// What an update changes.
+  enum class Changes { standing, moving };
+  std::uint64_t publish(scene::Environment environment, std::vector<std::int32_t> ids,
+                        Changes changes);
   /// The stream of an obstacle after an observation that continues or begins it.
   [[nodiscard]] MotionEstimator followed(const scene::Obstacle& obstacle, std::int32_t id,
                                          const Observation& observation) const;

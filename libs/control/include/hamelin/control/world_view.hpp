@@ -23,6 +23,7 @@ struct Surroundings {
   const scene::Environment& environment;
   std::uint64_t snapshot;  ///< differs if the environment is another one
   double time_s;
+  std::uint64_t standing = 0;  ///< differs if what stands still is another
 };
 
 /// Obstacles are searched within this distance if the planner gives no other [m].
@@ -133,6 +134,8 @@ class WorldView {
   [[nodiscard]] const scene::Environment& environment() const noexcept { return *environment_; }
   /// The number of the snapshot that the last look() saw; zero without a World.
   [[nodiscard]] std::uint64_t snapshot() const noexcept { return snapshot_; }
+  /// The same of what stands still: WorldSnapshot::standing.
+  [[nodiscard]] std::uint64_t standing() const noexcept { return standing_; }
   /// The id of an obstacle of environment(), which is its index without a World. `obstacle` may be
   /// that of a contact, also the map or unknown space.
   [[nodiscard]] std::int32_t obstacle_id(int obstacle) const noexcept {
@@ -170,7 +173,7 @@ class WorldView {
   const scene::Environment* environment_ = nullptr;
   scene::Environment::Scratch* scratch_ = nullptr;
   std::span<const std::int32_t> ids_;
-  std::uint64_t snapshot_ = 0;
+  std::uint64_t snapshot_ = 0, standing_ = 0;
   std::unique_ptr<scene::SelfField> self_;  ///< null if self-collision is not modelled
   double influence_, self_influence_ = 0.0;
   std::unique_ptr<Certificate> certificate_;
