@@ -17,7 +17,7 @@ constexpr double less = 0.5, least_share = 0.2;
 
 PathProof::PathProof(const model::Model& model, const scene::Levers& levers,
                      const scene::SelfField* self)
-    : levers_(levers), lines_(model, self), kept_(VectorXd::Ones(intervals_max)) {
+    : levers_(levers), edges_(model, self), kept_(VectorXd::Ones(intervals_max)) {
   for (auto* x : {&q0_, &q1_, &bend_}) x->setZero(model.dof());
 }
 
@@ -25,13 +25,12 @@ void PathProof::set(const CertifiedPath* path) {
   path_ = path != nullptr && path->clearance_m.size() <= intervals_max ? path : nullptr;
   first_ = 0;
   end_ = path_ != nullptr ? path_->clearance_m.size() : 0;
-  again_ = blocked_ = open_ = false;
+  again_ = blocked_ = false;
   kept_.setOnes();
 }
 
 void PathProof::see(const scene::Environment& environment, double time_s) {
-  lines_.set_environment(environment, time_s, false);
-  open_ = false;
+  edges_.set_environment(environment, time_s, false);
 }
 
 void PathProof::forget(const scene::Environment& environment, double time_s, Index first) {
@@ -43,31 +42,21 @@ void PathProof::forget(const scene::Environment& environment, double time_s, Ind
 }
 
 // docs/theory.md (14.35): an interval is proved by its chord, with what the curve strays from it.
-void PathProof::begin() {
+bool PathProof::prove() {
   path_->motion.chord(end_, q0_, q1_, bend_);
   const double stray = levers_.reach(bend_);
-  search::Margins margins(share_ * path_->clearance_m[end_] + stray);
-  margins.set_self_most(share_ * path_->self_m[end_] + stray);
-  lines_.set_margins(margins);
-  lines_.begin_motion(q0_, q1_);
-  open_ = true;
+  edges_.set_self_most(share_ * path_->self_m[end_] + stray);
+  return edges_.motion_clear(q0_, q1_, share_ * path_->clearance_m[end_] + stray);
 }
 
 void PathProof::advance(long checks) {
-  if (!again_ || blocked_) return;
-  const long since = lines_.checks();
-  for (long rest = checks; rest > 0 && end_ < path_->clearance_m.size();
-       rest = checks - (lines_.checks() - since)) {
-    if (!open_) begin();
-    const std::optional<bool> clear = lines_.prove(rest);
-    if (!clear) return;
-    open_ = false;
-    if (*clear) {
+  const long until = edges_.checks() + checks;
+  while (again_ && !blocked_ && end_ < path_->clearance_m.size() && edges_.checks() < until) {
+    if (prove()) {
       kept_[end_++] = share_;
       share_ = 1.0;
-    } else if ((share_ *= less) < least_share) {
-      blocked_ = true;
-      return;
+    } else {
+      blocked_ = (share_ *= less) < least_share;
     }
   }
 }

@@ -3,7 +3,7 @@
 
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/levers.hpp"
-#include "hamelin/search/line_check.hpp"
+#include "hamelin/search/edge_check.hpp"
 #include "shield/certified_path.hpp"
 
 namespace hamelin::control {
@@ -24,7 +24,7 @@ class PathProof {
   /// The same where what stands still has changed: what is proved of the path is void.
   /// @param first interval of the arm
   void forget(const scene::Environment& environment, double time_s, Eigen::Index first);
-  /// Goes on with the proof, for about so many checks.
+  /// Goes on with the proof, interval by interval until so many checks are made.
   void advance(long checks);
   /// Whether the intervals from first to last are proved.
   [[nodiscard]] bool covers(Eigen::Index first, Eigen::Index last) const noexcept {
@@ -39,13 +39,14 @@ class PathProof {
   [[nodiscard]] double self_m(Eigen::Index first, Eigen::Index last) const;
 
  private:
-  void begin();
+  /// Whether the next interval keeps share_ of its margins.
+  [[nodiscard]] bool prove();
 
   const scene::Levers& levers_;
-  search::LineCheck lines_;
+  search::EdgeCheck edges_;
   const CertifiedPath* path_ = nullptr;
   Eigen::Index first_ = 0, end_ = 0;
-  bool again_ = false, blocked_ = false, open_ = false;
+  bool again_ = false, blocked_ = false;
   double share_ = 1.0;    ///< of the margin that is asked for
   Eigen::VectorXd kept_;  ///< share of the margins that is proved, per interval
   Eigen::VectorXd q0_, q1_, bend_;
