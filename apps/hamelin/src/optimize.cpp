@@ -62,7 +62,7 @@ log::Trajectory trajectory_of(const optimal::SceneMotion& motion, std::optional<
   log::Trajectory out;
   out.joints = motion.joints;
   for (auto& point : motion.points(rate_hz))
-    out.points.push_back({point.time_s, point.q, point.v, point.torque});
+    out.points.push_back({point.time_s, point.q, point.v, point.torque, point.a});
   return out;
 }
 

@@ -25,9 +25,7 @@ struct PathRig {
     search::Settings settings;
     settings.q_lower = control::modelled_limits(scene, arm.robot()).q_lower;
     settings.q_upper = control::modelled_limits(scene, arm.robot()).q_upper;
-    control::PathTiming timing(scene, arm, nullptr,
-                               control::path_limits(scene, arm, {}, Json::object(), changes),
-                               changes.acceleration_max, 0.0, settings);
+    control::PathTiming timing(scene, arm, nullptr, {{}, Json::object(), changes}, settings);
     MatrixXd points(arm.dof(), 4);
     for (Index j = 0; j < arm.dof(); ++j)
       for (Index i = 0; i < 4; ++i)

@@ -122,11 +122,15 @@ Trajectory resampled(const Trajectory& trajectory, double rate_hz) {
 }
 
 std::string to_csv(const Trajectory& trajectory) {
-  const bool torques = std::any_of(trajectory.points.begin(), trajectory.points.end(),
-                                   [](const auto& point) { return point.tau.size() > 0; });
+  using Point = Trajectory::Point;
+  const auto known = [&](VectorXd Point::*column) {
+    return std::any_of(trajectory.points.begin(), trajectory.points.end(),
+                       [&](const Point& point) { return (point.*column).size() > 0; });
+  };
   std::string text = "time_s";
-  for (const char* kind : {"q_", "v_", "tau_"}) {
-    if (!torques && kind[0] == 't') continue;
+  for (const auto& [column, kind] : {std::pair(&Point::q, "q_"), {&Point::v, "v_"},
+                                     {&Point::tau, "tau_"}, {&Point::a, "a_"}}) {
+    if (!known(column)) continue;
     for (const auto& joint : trajectory.joints)
       text += fmt::format(",{}", csv_field(fmt::format("{}{}", kind, joint)));
   }
@@ -136,6 +140,7 @@ std::string to_csv(const Trajectory& trajectory) {
     append_numbers(text, point.q);
     append_numbers(text, point.v);
     append_numbers(text, point.tau);
+    append_numbers(text, point.a);
     text += '\n';
   }
   return text;
@@ -147,7 +152,7 @@ Json to_joint_trajectory(const Trajectory& trajectory) {
   for (const auto& point : trajectory.points)
     points.push_back({{"positions", finite_array(point.q, point.time_s, "q")},
                       {"velocities", finite_array(point.v, point.time_s, "v")},
-                      {"accelerations", Json::array()},
+                      {"accelerations", finite_array(point.a, point.time_s, "a")},
                       {"effort", finite_array(point.tau, point.time_s, "tau")},
                       {"time_from_start", duration(point.time_s - begin)}});
   return {{"header", {{"stamp", {{"sec", 0}, {"nanosec", 0}}}, {"frame_id", ""}}},

@@ -38,7 +38,7 @@ from ._hamelin import (
     plugin_path,
 )
 from ._logs import Log, read_log
-from ._motions import Explanation, Motion, PathPlan, explain, optimize, plan
+from ._motions import Explanation, Motion, PathMotion, PathPlan, explain, optimize, plan
 from ._pages import Page, report
 from ._robots import FitResult, fit_robot, robot_info
 from ._runs import Result, Verification, full_config, integrate, load_scene, run, verify
@@ -60,6 +60,7 @@ __all__ = [
     "Model",
     "Motion",
     "Page",
+    "PathMotion",
     "PathPlan",
     "PlannerSetup",
     "Result",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Sequence
 
 import numpy as np
@@ -13,8 +14,42 @@ from ._runs import SceneLike, as_scene, overrides_of
 from ._types import Array, Document, DocumentMapping, PathLike, Progress
 
 
+@dataclass(frozen=True)
+class PathMotion:
+    """A motion from rest to rest along a path, all of which is proved clear.
+
+    duration_s [s]; clearance_m: what the arm keeps from obstacles and itself, at least [m];
+    time_s: times of points, shape (N,) [s]; q, v, a: positions, velocities and accelerations
+    there, shape (N, n) [rad or m, and per s and s^2].
+    """
+
+    duration_s: float
+    clearance_m: float
+    time_s: Array
+    q: Array
+    v: Array
+    a: Array
+
+
 class PathPlan(DocumentMapping):
     """Joint paths to the goals of a scene: a mapping of the document hamelin.path/1."""
+
+    @property
+    def motions(self) -> list[PathMotion | None]:
+        """The motion to each goal; None where there is none, or none was asked for."""
+        return [
+            PathMotion(
+                goal["motion"]["duration_s"],
+                goal["motion"]["clearance_m"],
+                *(
+                    np.array(goal["motion"][key], dtype=np.float64)
+                    for key in ("time_s", "q", "v", "a")
+                ),
+            )
+            if goal["motion"]
+            else None
+            for goal in self._document["paths"]
+        ]
 
     @property
     def found(self) -> bool:
@@ -137,17 +172,20 @@ def plan(
     checks: int | None = None,
     seed: int | None = None,
     set: str | Sequence[str] | None = None,  # noqa: A002 (the program's name)
+    motions: bool = True,
 ) -> PathPlan:
-    """Searches a path that is proved clear to each goal of a scene, as `hamelin plan`.
+    """Searches a path to each goal of a scene and the fastest motion along it, both proved clear,
+    as `hamelin plan`.
 
     scene: a file, a Scene, or a document as a dict. guide: as in a scene; None:
     the scene's. checks: after which a search ends without a path. set: values such as
-    "/planner/guide_options/margin_m=0.02".
+    "/planner/guide_options/margin_m=0.02". motions: whether motions are made.
     """
     values = [set] if isinstance(set, str) else list(set or ())
     if checks is not None:
         values.append(f"/planner/guide_options/checks_max={checks}")
-    return PathPlan(_plan(as_scene(scene, overrides_of(guide=guide, seed=seed, set=values))))
+    made = as_scene(scene, overrides_of(guide=guide, seed=seed, set=values))
+    return PathPlan(_plan(made, motions))
 
 
 def optimize(

@@ -14,12 +14,13 @@ namespace hamelin::python {
 
 namespace {
 
-py::object plan(const BoundScene& scene) {
+py::object plan(const BoundScene& scene, bool motions) {
   control::PathPlan found;
   InterruptCheck interrupts;
   {
     const py::gil_scoped_release unlocked;
-    found = control::plan_paths(scene.scene, [&interrupts] { interrupts.raise(); });
+    found = control::plan_paths(scene.scene,
+                                {.motions = motions, .poll = [&interrupts] { interrupts.raise(); }});
   }
   return to_python(control::to_json(found));
 }
@@ -109,7 +110,7 @@ py::tuple explain(py::handle log, int motions, std::uint64_t seed, const py::obj
 
 void add_motions(py::module_& module) {
   using py::arg;
-  module.def("_plan", &plan, arg("scene"), "The document of `hamelin plan`.");
+  module.def("_plan", &plan, arg("scene"), arg("motions"), "The document of `hamelin plan`.");
   module.def("_optimize", &optimize, arg("scene"), arg("options"),
              "The document of `hamelin optimize`, and whether the motion is valid.");
   module.def("_explain", &explain, arg("log"), arg("motions"), arg("seed"), arg("progress"),

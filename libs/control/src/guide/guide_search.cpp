@@ -15,12 +15,9 @@ GuideRequest::GuideRequest(Index dof, Index points_max)
 }
 
 GuideSearch::GuideSearch(const model::Model& model, const World& world, const WorldView& view,
-                         search::Settings settings, std::unique_ptr<PathTiming> timing,
-                         long other_checks, Index points_max, bool threaded)
-    : search_(model, std::move(settings)),
+                         std::unique_ptr<MotionSearch> search, Index points_max, bool threaded)
+    : search_(std::move(search)),
       query_(model, world, view),
-      timing_(std::move(timing)),
-      other_checks_(other_checks),
       request_(model.dof(), points_max),
       answers_(std::make_unique<GuideAnswer>()) {
   if (threaded) thread_ = std::thread([this] { work(); });
@@ -62,35 +59,17 @@ bool GuideSearch::still_clear() {
 }
 
 void GuideSearch::find(GuideAnswer& out) {
-  search::Problem problem{
-      request_.q, {request_.goal}, request_.search, request_.kept.leftCols(request_.kept_count)};
-  out.path = search_.search(problem, query_);
-  out.checks += out.path.checks;
-  if (!out.path.found() || !timing_) return;
-  const long before = query_.checks() + timing_->checks();
-  timing_->begin(request_.search);
-  timing_->consider(out.path.points, search_.margins(), query_);
-  find_others(problem, out);
-  out.motion = timing_->make(query_);
-  if (out.motion) {
-    out.motion->standing = query_.standing();
-    out.path.points = timing_->points();
-    out.path.length = search::path_length(out.path.points);
-  }
-  out.checks += query_.checks() + timing_->checks() - before;
-}
-
-// Other random numbers may lead around the other side of an obstacle.
-void GuideSearch::find_others(search::Problem& problem, const GuideAnswer& out) {
-  if (out.path.points.cols() == 2) return;
-  const long until = query_.checks() + other_checks_;
-  for (std::uint64_t k = 1; query_.checks() < until; ++k) {
-    problem.number = request_.search + (k << 32);
-    search_.begin(problem, query_);
-    if (!search_.advance(until - query_.checks())) return;
-    if (search_.path().found() && search_.path().margin_m >= out.path.margin_m)
-      timing_->consider(search_.path().points, search_.margins(), query_);
-  }
+  MotionSearch::Found found =
+      search_->find({request_.q, {request_.goal}, request_.search,
+                    request_.kept.leftCols(request_.kept_count)},
+                   query_);
+  out.checks += found.checks;
+  out.path = std::move(found.path);
+  out.motion = std::move(found.motion);
+  out.motion_cause = std::move(found.cause);
+  if (!out.motion) return;
+  out.path.points = std::move(found.way_points);
+  out.path.length = search::path_length(out.path.points);
 }
 
 void GuideSearch::answer() {

@@ -3,11 +3,11 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <thread>
 
 #include "guide/guide_query.hpp"
-#include "guide/path_timing.hpp"
-#include "hamelin/search/search.hpp"
+#include "guide/motion_search.hpp"
 #include "loop/newest.hpp"
 
 namespace hamelin::control {
@@ -35,6 +35,7 @@ struct GuideAnswer {
   search::Path path;
   /// The motion along the path; null if there is none, or none is asked for.
   std::unique_ptr<CertifiedPath> motion;
+  std::string motion_cause;  ///< one line: why the path has no motion
 };
 
 /// Answers the requests of a control loop, one at a time: on a thread of its own, or where its
@@ -42,13 +43,10 @@ struct GuideAnswer {
 class GuideSearch {
  public:
   /// @param points_max as for GuideRequest
-  /// @param timing null: no motions along paths are made
-  /// @param other_checks that are spent on other paths to a goal, of which the fastest is taken
   /// @param threaded whether it has a thread of its own; else run() does the work
   /// model, world and view must outlive this
   GuideSearch(const model::Model& model, const World& world, const WorldView& view,
-              search::Settings settings, std::unique_ptr<PathTiming> timing, long other_checks,
-              Eigen::Index points_max, bool threaded);
+              std::unique_ptr<MotionSearch> search, Eigen::Index points_max, bool threaded);
   GuideSearch(const GuideSearch&) = delete;
   GuideSearch& operator=(const GuideSearch&) = delete;
   ~GuideSearch();
@@ -70,12 +68,9 @@ class GuideSearch {
   void answer();
   [[nodiscard]] bool still_clear();
   void find(GuideAnswer& out);
-  void find_others(search::Problem& problem, const GuideAnswer& out);
 
-  search::Search search_;
+  std::unique_ptr<MotionSearch> search_;
   GuideQuery query_;
-  std::unique_ptr<PathTiming> timing_;
-  long other_checks_;
   GuideRequest request_;
   Newest<GuideAnswer> answers_;
   std::atomic<State> state_{State::idle};

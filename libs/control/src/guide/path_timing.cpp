@@ -28,6 +28,8 @@ constexpr double rate_share = 0.5, ramp_share = 0.2, whole_rate = 0.9, braking_r
 constexpr double infinity = std::numeric_limits<double>::infinity();
 // Intervals that keep less than what is enough are examined again [m].
 constexpr double least_enough_m = 0.004;
+// What a stop along a path may need of the margins, by what an arm at rest needs.
+constexpr double tube_share = 2.5;
 // Factors of such a margin that are tried.
 constexpr std::array<double, 3> higher{4.0, 2.5, 1.6};
 // Places at which torques are evaluated, that cost as much as a check.
@@ -36,11 +38,9 @@ constexpr long places_per_check = 8;
 constexpr int mass_places = 5;
 constexpr double mass_between = 1.1;
 
-}  // namespace
-
-timing::Limits path_limits(const scene::Scene& scene, const model::Model& model,
-                           const LimitReserve& reserve, const Json& params,
-                           const ChangeBounds& changes) {
+timing::Limits limits_of(const scene::Scene& scene, const model::Model& model,
+                         const PathTiming::Bounds& bounds) {
+  const auto& [reserve, params, changes] = bounds;
   const ModelledLimits modelled = modelled_limits(scene, model.robot());
   timing::Limits out;
   out.velocity = modelled.velocity_max;
@@ -66,18 +66,20 @@ timing::Limits path_limits(const scene::Scene& scene, const model::Model& model,
   return out;
 }
 
+}  // namespace
+
 PathTiming::PathTiming(const scene::Scene& scene, const model::Model& model,
-                       const scene::SelfField* self, const timing::Limits& limits,
-                       VectorXd stop_acceleration, double enough_m,
+                       const scene::SelfField* self, const Bounds& bounds,
                        const search::Settings& settings)
     : model_(model),
-      limits_(limits),
-      stop_acceleration_(std::move(stop_acceleration)),
-      enough_m_(std::max(enough_m, least_enough_m)),
+      limits_(limits_of(scene, model, bounds)),
+      stop_acceleration_(bounds.changes.acceleration_max),
+      enough_m_(std::max(tube_share * std::max(bounds.reserve.obstacles_m, bounds.reserve.self_m),
+                         least_enough_m)),
       levers_(model, self),
       blending_(levers_),
-      way_points_(model, levers_, limits, settings.q_lower, settings.q_upper),
-      law_(model, limits),
+      way_points_(model, levers_, limits_, settings.q_lower, settings.q_upper),
+      law_(model, limits_),
       seed_(settings.seed),
       ws_(model) {
   const ModelledLimits modelled = modelled_limits(scene, model.robot());

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
+#include <string_view>
 
 #include "guide/guide_query.hpp"
 #include "hamelin/control/planner_setup.hpp"
@@ -15,24 +16,20 @@
 
 namespace hamelin::control {
 
-/// The limits of motions along paths: within those of planner and shield, so that neither has to
-/// change them.
-/// @param reserve what a shield keeps @param params of the planner, for acceleration_max
-/// @param changes what the drives bound
-[[nodiscard]] timing::Limits path_limits(const scene::Scene& scene, const model::Model& model,
-                                         const LimitReserve& reserve, const Json& params,
-                                         const ChangeBounds& changes);
-
 /// Makes timed motions of paths that a search has found, and says what is proved of them.
 class PathTiming {
  public:
+  /// What bounds motions, which keep within what planner and shield leave to them, so that neither
+  /// has to change them.
+  struct Bounds {
+    LimitReserve reserve;  ///< what a shield keeps
+    Json params;           ///< of the planner, for acceleration_max
+    ChangeBounds changes;  ///< of the drives
+  };
   /// @param model kept by reference @param self null if self-collision is not modelled
-  /// @param stop_acceleration what stops may use; of size zero: no bound
-  /// @param enough_m margin beyond which a path need not be proved
   /// @param settings of the search, for the joint limits that way-points keep
   PathTiming(const scene::Scene& scene, const model::Model& model, const scene::SelfField* self,
-             const timing::Limits& limits, Eigen::VectorXd stop_acceleration, double enough_m,
-             const search::Settings& settings);
+             const Bounds& bounds, const search::Settings& settings);
 
   /// Begins with the paths to a goal. @param number of the search, for random numbers
   void begin(std::uint64_t number);
@@ -42,10 +39,12 @@ class PathTiming {
   void consider(const Eigen::MatrixXd& points, const search::Margins& margins,
                 search::Query& query);
   /// Improves the fastest path and makes a motion along it.
-  /// @return null if there is none
+  /// @return null if there is none; see cause()
   [[nodiscard]] std::unique_ptr<CertifiedPath> make(search::Query& query);
   /// The way-points of the fastest path.
   [[nodiscard]] const Eigen::MatrixXd& points() const { return best_->points(); }
+  /// One line: why the last make() found no motion.
+  [[nodiscard]] std::string_view cause() const noexcept { return law_.cause(); }
   /// Work beside that of the query, in checks.
   [[nodiscard]] long checks() const noexcept { return checks_; }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "guide/guide_query.hpp"
+#include "guide/motion_search.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 
@@ -50,6 +51,20 @@ Json columns(const Eigen::MatrixXd& points) {
   return out;
 }
 
+// Spacing of the points of a motion in a document [s].
+constexpr double document_spacing_s = 0.01;
+
+Json motion_json(const PlannedMotion& motion) {
+  const scene::JointTrajectory points = motion.motion.sampled(document_spacing_s);
+  return {{"duration_s", motion.motion.duration_s()},
+          {"clearance_m", motion.clearance_m},
+          {"way_points", columns(motion.way_points)},
+          {"time_s", std::vector<double>(points.time_s.begin(), points.time_s.end())},
+          {"q", columns(points.q)},
+          {"v", columns(points.v)},
+          {"a", columns(points.a)}};
+}
+
 Json planned_json(const PlannedGoal& goal) {
   const search::Path& path = goal.path;
   Json out{{"type", goal.type},
@@ -58,6 +73,8 @@ Json planned_json(const PlannedGoal& goal) {
            {"q", columns(path.points)},
            {"length", path.length},
            {"certificate", nullptr},
+           {"motion", goal.motion ? motion_json(*goal.motion) : Json(nullptr)},
+           {"motion_cause", goal.motion_cause.empty() ? Json(nullptr) : Json(goal.motion_cause)},
            {"search",
             {{"checks", path.checks},
              {"first_checks", path.first_checks},
@@ -74,24 +91,78 @@ Json planned_json(const PlannedGoal& goal) {
   return out;
 }
 
+PlannedGoal planned(MotionSearch& search, GuideQuery& query, const search::Problem& problem) {
+  PlannedGoal out;
+  out.type = scene::type_name(problem.goals.front());
+  const double since = process_cpu_s();
+  MotionSearch::Found found = search.find(problem, query);
+  out.search_s = process_cpu_s() - since;
+  out.path = std::move(found.path);
+  const Eigen::MatrixXd& points = out.path.points;
+  for (Index i = 0; i + 1 < points.cols(); ++i)
+    out.clearance_m.push_back(query.proved_clearance(points.col(i), points.col(i + 1)));
+  out.motion_cause = std::move(found.cause);
+  if (!found.motion) return out;
+  out.motion = PlannedMotion{
+      std::move(found.way_points), std::move(found.motion->motion),
+      std::min(found.motion->clearance_m.minCoeff(), found.motion->self_m.minCoeff())};
+  return out;
+}
+
+// The second begins where the first one ends.
+void append(scene::JointTrajectory& out, const scene::JointTrajectory& more) {
+  const Index before = out.points();
+  if (before == 0) {
+    out = more;
+    return;
+  }
+  const Index added = more.points() - 1;
+  const double end = out.time_s[before - 1];
+  out.time_s.conservativeResize(before + added);
+  out.time_s.tail(added) = more.time_s.tail(added).array() + end;
+  for (auto [to, from] : {std::pair(&out.q, &more.q), {&out.v, &more.v}, {&out.a, &more.a}}) {
+    to->conservativeResize(Eigen::NoChange, before + added);
+    to->rightCols(added) = from->rightCols(added);
+  }
+}
+
+// Of what a scene sends to an arm.
+ChangeBounds changes_of(const scene::Scene& scene, int dof) {
+  ChangeBounds out{scene.actuation.torque_rate_max_Nm_s.value_or(0.0), {}, {}};
+  if (scene.actuation.type != scene::ActuationType::position) return out;
+  const auto values = [&](const std::vector<double>& given, const char* key) {
+    return one_or_per_joint(given, dof, fmt::format("{}: /actuation/servo/{}", scene.name, key));
+  };
+  out.acceleration_max = values(scene.actuation.servo.acceleration_max, "acceleration_max");
+  out.jerk_max = values(scene.actuation.servo.jerk_max, "jerk_max");
+  return out;
+}
+
 }  // namespace
 
-PathPlan plan_paths(const scene::Scene& scene, const std::function<void()>& poll) {
+PathPlan plan_paths(const scene::Scene& scene, const PlanOptions& options) {
   check(scene);
   const model::Model arm = load_model(scene);
   World world(scene, arm, {});
-  return plan_paths(scene, arm, world, poll);
+  return plan_paths(scene, arm, world, options);
 }
 
 PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& world,
-                    const std::function<void()>& poll) {
+                    const PlanOptions& options) {
   check(scene);
   check_numbers(scene, arm);
   const WorldView view(scene, arm, world);
   GuideQuery query(arm, world, view);
-  query.set_poll(poll);
+  query.set_poll(options.poll);
   const Json params = scene.planner ? scene.planner->params : Json::object();
-  search::Search search(arm, guide_settings(scene, arm, view, reserve_of(scene), params));
+  const LimitReserve reserve = reserve_of(scene);
+  const search::Settings settings = guide_settings(scene, arm, view, reserve, params);
+  std::unique_ptr<PathTiming> timing;
+  if (options.motions)
+    timing = std::make_unique<PathTiming>(
+        scene, arm, view.self_field(),
+        PathTiming::Bounds{reserve, params, changes_of(scene, arm.dof())}, settings);
+  MotionSearch search(arm, settings, std::move(timing), MotionSearch::other_checks(scene.guide));
   PathPlan plan;
   plan.scene = scene.name;
   plan.robot = arm.robot().name;
@@ -101,19 +172,25 @@ PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& w
   plan.goal_count = scene.goals.size();
   VectorXd start = scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(arm.dof());
   for (const scene::Goal& goal : scene.goals) {
-    PlannedGoal planned;
-    planned.type = scene::type_name(goal);
-    const double since = process_cpu_s();
-    planned.path = search.search({start, {goal}, plan.goals.size() + 1}, query);
-    planned.search_s = process_cpu_s() - since;
-    const Eigen::MatrixXd& points = planned.path.points;
-    for (Index i = 0; i + 1 < points.cols(); ++i)
-      planned.clearance_m.push_back(query.proved_clearance(points.col(i), points.col(i + 1)));
-    plan.goals.push_back(std::move(planned));
-    if (!plan.goals.back().path.found()) break;
-    start = plan.goals.back().path.points.rightCols(1);
+    plan.goals.push_back(planned(search, query, {start, {goal}, plan.goals.size() + 1}));
+    const PlannedGoal& found = plan.goals.back();
+    if (!found.path.found()) break;
+    start = found.motion ? found.motion->way_points.rightCols(1) : found.path.points.rightCols(1);
   }
   return plan;
+}
+
+scene::JointTrajectory trajectory_of(const PathPlan& plan, double spacing_s) {
+  scene::JointTrajectory out;
+  for (std::size_t i = 0; i < plan.goals.size(); ++i) {
+    const PlannedGoal& goal = plan.goals[i];
+    if (!goal.motion)
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: /goals/{}: no motion: {}", plan.scene, i,
+                              goal.path.found() ? goal.motion_cause : goal.path.cause));
+    append(out, goal.motion->motion.sampled(spacing_s));
+  }
+  return out;
 }
 
 Json to_json(const PathPlan& plan) {

@@ -52,34 +52,20 @@ bool searches_paths(const scene::Scene& scene, const planning::Plugin& plugin) n
          (scene.guide.type == scene::GuideType::on_request && plugin.asks_for_paths());
 }
 
-namespace {
-
-// While the arm waits for them, other paths must not cost more time than they save.
-long other_checks(const scene::GuideSpec& spec) {
-  constexpr double most_s = 0.006, most = 3000.0;
-  return std::lround(spec.check_time_s * most > most_s ? most_s / spec.check_time_s : most);
-}
-
-// What a stop along a path may need of the margins, by what an arm at rest needs.
-constexpr double tube_share = 2.5;
-
-}  // namespace
-
 std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, const Json& params,
                                                    const ArmSetup& arm) {
   if (!searches_paths(scene, arm.plugin)) return nullptr;
   const LimitReserve reserve = shield ? shield->limit_reserve() : LimitReserve{};
   const search::Settings settings = guide_settings(scene, model, view, reserve, params);
   std::unique_ptr<PathTiming> timing;
-  const ChangeBounds changes = arm.drive.changes(scene);
   if (arm.plugin.follows_trajectories())
-    timing = std::make_unique<PathTiming>(scene, model, view.self_field(),
-                                          path_limits(scene, model, reserve, params, changes),
-                                          changes.acceleration_max,
-                                          tube_share * std::max(reserve.obstacles_m, reserve.self_m),
-                                          settings);
+    timing = std::make_unique<PathTiming>(
+        scene, model, view.self_field(),
+        PathTiming::Bounds{reserve, params, arm.drive.changes(scene)}, settings);
   return std::make_unique<GuideSearch>(
-      model, arm.world, view, settings, std::move(timing), other_checks(scene.guide),
+      model, arm.world, view,
+      std::make_unique<MotionSearch>(model, settings, std::move(timing),
+                                     MotionSearch::other_checks(scene.guide)),
       static_cast<Eigen::Index>(arm.path_points_max), arm.guide_thread);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,8 +9,16 @@
 #include "hamelin/io/json.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "hamelin/search/search.hpp"
+#include "hamelin/timing/timed_path.hpp"
 
 namespace hamelin::control {
+
+/// A motion from rest to rest, all of which is proved to be clear.
+struct PlannedMotion {
+  Eigen::MatrixXd way_points;  ///< dof × way-points, whose corners the motion rounds
+  timing::TimedPath motion;
+  double clearance_m = 0.0;  ///< what the arm keeps from obstacles and from itself, at least [m]
+};
 
 /// The path to one goal of a scene, with its certificate.
 struct PlannedGoal {
@@ -19,6 +28,8 @@ struct PlannedGoal {
   /// itself that is proved, but for 0.1 mm [m]; at most 0.2 m.
   std::vector<double> clearance_m;
   double search_s = 0.0;  ///< CPU time of the search; no result depends on it
+  std::optional<PlannedMotion> motion;  ///< where it is asked for
+  std::string motion_cause;             ///< one line: why there is none
 };
 
 /// The paths of a scene's guide, one after the other.
@@ -33,16 +44,26 @@ struct PathPlan {
   }
 };
 
+/// What is asked for.
+struct PlanOptions {
+  /// Motions within the limits of the scene, too: docs/theory.md, chapter 19. Each path is followed
+  /// by the next from where its motion ends.
+  bool motions = false;
+  /// Called now and then during searches; it may throw to end them.
+  std::function<void()> poll = {};
+};
+
 /// Searches a path from the start of a scene to its first goal, and from each goal to the next, in
 /// the world as it is at time 0.
 /// @throws Error io, parse or invalid for bad input, a scene with guide none, or a goal that
 ///         follows a target
-/// @param poll called now and then during searches; it may throw to end them
-[[nodiscard]] PathPlan plan_paths(const scene::Scene& scene,
-                                  const std::function<void()>& poll = {});
+[[nodiscard]] PathPlan plan_paths(const scene::Scene& scene, const PlanOptions& options = {});
 /// The same with the scene's model and a world that were made before.
 [[nodiscard]] PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& world,
-                                  const std::function<void()>& poll = {});
+                                  const PlanOptions& options = {});
+/// The motions of all goals, one after the other, at times that are at most `spacing_s` apart.
+/// @throws Error invalid if there is none to some goal, with the cause
+[[nodiscard]] scene::JointTrajectory trajectory_of(const PathPlan& plan, double spacing_s);
 
 /// As hamelin.path/1, docs/schema/path.schema.json.
 [[nodiscard]] Json to_json(const PathPlan& plan);

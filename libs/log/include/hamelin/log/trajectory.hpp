@@ -14,6 +14,7 @@ struct Trajectory {
     double time_s = 0.0;
     Eigen::VectorXd q, v;  ///< one number per joint [rad or m, and per s]
     Eigen::VectorXd tau;   ///< [Nm or N]; empty in free motion
+    Eigen::VectorXd a{};   ///< [rad/s² or m/s²]; empty where it is not known
   };
 
   std::vector<std::string> joints;
@@ -30,8 +31,8 @@ struct Trajectory {
 /// @param rate_hz positive and finite @throws Error usage
 [[nodiscard]] Trajectory resampled(const Trajectory& trajectory, double rate_hz);
 
-/// Comma-separated values (RFC 4180): time_s, then q_, v_ and tau_ of each joint. Numbers that are
-/// not finite are left empty.
+/// Comma-separated values (RFC 4180): time_s, then q_, v_ and, where they are known, tau_ and a_ of
+/// each joint. Numbers that are not finite are left empty.
 [[nodiscard]] std::string to_csv(const Trajectory& trajectory);
 
 /// The fields of ROS 2's trajectory_msgs/msg/JointTrajectory as JSON.
