@@ -107,7 +107,7 @@ void Blending::widen(BlendedPath& path, const search::Margins& margins, search::
   for (Index i = first; i <= last; ++i) {
     const double cut = levers_.reach(path.turn(i).cwiseAbs()) / 6.0, room = path.room(i),
                  free = std::min(room, cut > 0.0 ? loss_m / cut : room);  // needs no proof
-    double d = std::clamp(path.half_length(i), free, room);
+    double d = std::min(path.half_length(i), room);
     path.set_half_length(i, d);
     for (int k = 0; k < tries && d > free && !is_clear(path, i, margins, query); ++k) {
       d = k + 1 < tries ? std::max(free, next_width * d) : free;

@@ -125,13 +125,13 @@ double WayPoints::improve(BlendedPath& path, const search::Margins& margins, sea
     if (!are_apart(trial_)) continue;
     BlendedPath candidate(trial_);
     predict(path, changed, candidate);
-    if (law_.duration_s(candidate.curve()) > worth_proof * best) {
+    if (!(law_.duration_s(candidate.curve()) < worth_proof * best)) {
       spread_ = std::max(least_spread, narrower * spread_);
       continue;
     }
     if (!prove(candidate, changed, margins, query)) continue;
     const double duration = law_.duration_s(candidate.curve());
-    if (duration > worth_change * best) continue;
+    if (!(duration < worth_change * best)) continue;
     path = std::move(candidate);
     best = duration;
     spread_ = std::min(most_spread, wider * spread_);

@@ -389,6 +389,22 @@ TEST_CASE("blends are as wide as they are clear", "[timing][property]") {
   CHECK(wide.half_length(1) + wide.half_length(2) > path.half_length(1) + path.half_length(2));
 }
 
+TEST_CASE("blends leave room for each other on lines that are short", "[timing][unit]") {
+  Balls rig;
+  MatrixXd points(3, 6);
+  points << rig.points.col(0), rig.points.col(1), rig.points.col(1), rig.points.col(1),
+      rig.points.col(2), rig.points.col(3);
+  points.col(2) += VectorXd::Constant(3, 1e-3);
+  points.col(3) += 3e-3 * VectorXd::Unit(3, 1);
+  timing::BlendedPath path(points);
+  test::JointSpaceWorld empty({});
+  timing::Blending(rig.levers).widen(path, search::Margins(Balls::margin_m), empty);
+  for (Index i = 1; i <= path.corners(); ++i) CHECK(path.half_length(i) > 0.0);
+  CHECK(path.curve().is_smooth());
+  timing::TimeLaw law(rig.arm, limits_of(3, 2.0, 8.0, 0.0));
+  CHECK(std::isfinite(law.duration_s(path.curve())));
+}
+
 TEST_CASE("way-points are moved to where the motion is faster and still clear",
           "[timing][property]") {
   Balls rig;

@@ -120,6 +120,7 @@ Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
     ++figures_.found;
     figures_.length = answer.path.length;
     margin_m_ = answer.path.margin_m;
+    cause_.assign(answer.motion_cause, 0, cause_max);
     before_.swap(answer.motion);  // the memory of the one before goes back with the answer
     before_.swap(motion_);
     set_path(now, answer.path.points);

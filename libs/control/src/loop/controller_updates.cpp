@@ -339,7 +339,8 @@ void Controller::update_guidance() {
   if (news == Guidance::News::none || !options_.log) return;
   LineBuffer line;
   if (news == Guidance::News::path)
-    append(line, "guide: a path of length {:.4g}", guidance_->figures().length);
+    append(line, "guide: a path of length {:.4g}{}{}", guidance_->figures().length,
+           guidance_->cause().empty() ? "" : ", without a motion: ", guidance_->cause());
   else
     append(line, "guide: {}", guidance_->cause());
   options_.log(HAMELIN_LOG_INFO, line.view());
