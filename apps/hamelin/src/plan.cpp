@@ -44,8 +44,8 @@ std::string plan_text(const control::PlannedGoal& goal, std::size_t index) {
                         coloured("motion", Colour::good), goal.motion->motion.duration_s(),
                         goal.motion->clearance_m);
   else
-    text += fmt::format("{:<12}{}: {}\n", "", coloured("no motion", Colour::bad),
-                        goal.motion_cause);
+    text +=
+        fmt::format("{:<12}{}: {}\n", "", coloured("no motion", Colour::bad), goal.motion_cause);
   return text;
 }
 
@@ -55,10 +55,8 @@ std::string file_text(const PlanOptions& options, const control::PathPlan& plan,
   const scene::JointTrajectory motion = control::trajectory_of(plan, 1.0 / options.rate_hz);
   log::Trajectory out{plan.joints, {}};
   for (Eigen::Index i = 0; i < motion.points(); ++i)
-    out.points.push_back(
-        {motion.time_s[i], motion.q.col(i), motion.v.col(i), {}, motion.a.col(i)});
-  return options.format == "csv" ? log::to_csv(out)
-                                 : log::to_joint_trajectory(out).dump(1) + "\n";
+    out.points.push_back({motion.time_s[i], motion.q.col(i), motion.v.col(i), {}, motion.a.col(i)});
+  return options.format == "csv" ? log::to_csv(out) : log::to_joint_trajectory(out).dump(1) + "\n";
 }
 
 int plan(PlanOptions options) {

@@ -128,8 +128,8 @@ std::string to_csv(const Trajectory& trajectory) {
                        [&](const Point& point) { return (point.*column).size() > 0; });
   };
   std::string text = "time_s";
-  for (const auto& [column, kind] : {std::pair(&Point::q, "q_"), {&Point::v, "v_"},
-                                     {&Point::tau, "tau_"}, {&Point::a, "a_"}}) {
+  for (const auto& [column, kind] :
+       {std::pair(&Point::q, "q_"), {&Point::v, "v_"}, {&Point::tau, "tau_"}, {&Point::a, "a_"}}) {
     if (!known(column)) continue;
     for (const auto& joint : trajectory.joints)
       text += fmt::format(",{}", csv_field(fmt::format("{}{}", kind, joint)));

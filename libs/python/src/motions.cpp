@@ -19,8 +19,8 @@ py::object plan(const BoundScene& scene, bool motions) {
   InterruptCheck interrupts;
   {
     const py::gil_scoped_release unlocked;
-    found = control::plan_paths(scene.scene,
-                                {.motions = motions, .poll = [&interrupts] { interrupts.raise(); }});
+    found = control::plan_paths(
+        scene.scene, {.motions = motions, .poll = [&interrupts] { interrupts.raise(); }});
   }
   return to_python(control::to_json(found));
 }

@@ -44,16 +44,17 @@ void average(const TimedPath& motion, double window_s, int intervals, TimedPath&
   for (Index i = 0; i < n; ++i) {
     out.time_s[i] = step_s * static_cast<double>(i);
     out.speed[i] = std::max(0.0, sum / intervals);
-    sum += 0.5 * (speed_at(i) + speed_at(i + 1) - speed_at(i - intervals) -
-                  speed_at(i + 1 - intervals));
+    sum += 0.5 *
+           (speed_at(i) + speed_at(i + 1) - speed_at(i - intervals) - speed_at(i + 1 - intervals));
   }
   out.place[0] = motion.place[0];
   for (Index i = 0; i + 1 < n; ++i) {
     const auto change = [&](Index k) { return (speed_at(k) - speed_at(k - intervals)) / window_s; };
     out.rate[i] = change(i);
     out.ramp[i] = (change(i + 1) - change(i)) / step_s;
-    out.place[i + 1] = out.place[i] + step_s * (out.speed[i] + step_s * (0.5 * out.rate[i] +
-                                                                         step_s * out.ramp[i] / 6.0));
+    out.place[i + 1] =
+        out.place[i] +
+        step_s * (out.speed[i] + step_s * (0.5 * out.rate[i] + step_s * out.ramp[i] / 6.0));
   }
   out.place[n - 1] = motion.place[motion.nodes() - 1];
   out.speed[n - 1] = 0.0;

@@ -24,8 +24,8 @@ constexpr int solutions_max = 4;
 // Slopes and coefficients that count as zero, relative to a limit.
 constexpr double negligible = 1e-12;
 constexpr double squared_speed_max = 1e8;
-// The window over which a motion is averaged: at first, at most [s], and its intervals; how often it
-// and the shares are changed.
+// The window over which a motion is averaged: at first, at most [s], and its intervals; how often
+// it and the shares are changed.
 constexpr double least_window_s = 0.02, longest_window_s = 0.5;
 constexpr int window_intervals = 4, averages_max = 16;
 // What the window alone may use of the bounds of rates, and by how much more is corrected than is
@@ -42,7 +42,7 @@ void check(const VectorXd& limit, const char* name, Index dof, bool optional) {
         fmt::format("time law: {}: expected {} positive numbers (one per joint)", name, dof));
 }
 
-// The largest value of a parabola through three, docs/theory.md (19.9), and of its slope by `h`.
+// The largest value of a parabola through three, and of its slope: docs/theory.md (19.9), (19.13).
 double largest_value(double f0, double f1, double f2) {
   return std::max({std::abs(f0), std::abs(f1), std::abs(f2)}) + std::abs(f0 - 2.0 * f1 + f2) / 8.0;
 }
@@ -170,7 +170,8 @@ bool TimeLaw::backward() {
     const double share = std::min(shares_[std::min(i, n - 2)], shares_[std::max<Index>(i - 1, 0)]);
     for (Index j = 0; j < limits_.velocity.size(); ++j)
       if (const double slope = rows_.tangent(j, i); slope != 0.0)
-        squared_max_[i] = std::min(squared_max_[i], std::pow(share * limits_.velocity[j] / slope, 2));
+        squared_max_[i] =
+            std::min(squared_max_[i], std::pow(share * limits_.velocity[j] / slope, 2));
   }
   controllable_.resize(n);
   controllable_[n - 1] = 0.0;
@@ -276,8 +277,8 @@ bool TimeLaw::solve_with_ramps(TimedPath& out) {
       most = {std::max(most.values, at.values), std::max(most.rates, at.rates),
               std::max(most.ramp, at.ramp)};
       // rates grow with the third power of the speed, and accelerations with its square
-      const double excess = at.ramp > ramp_share ? at.values
-                                                 : std::max(at.values, std::pow(at.rates, 2.0 / 3));
+      const double excess =
+          at.ramp > ramp_share ? at.values : std::max(at.values, std::pow(at.rates, 2.0 / 3));
       if (excess > 1.0) lower_shares(out, k, window_s, corrected / excess);
     }
     if (std::max(most.values, most.rates) <= 1.0) {
@@ -314,9 +315,8 @@ void TimeLaw::evaluate_between(const TimedPath& motion) {
 // three points may rise between them.
 TimeLaw::Used TimeLaw::used(const TimedPath& motion, Index i, const Rows& nodes) const {
   Used out;
-  const double h = motion.time_s[i + 1] - motion.time_s[i], r = motion.ramp[i],
-               u0 = motion.rate[i], u1 = u0 + 0.5 * h * r, u2 = u0 + h * r,
-               x0 = motion.speed[i] * motion.speed[i],
+  const double h = motion.time_s[i + 1] - motion.time_s[i], r = motion.ramp[i], u0 = motion.rate[i],
+               u1 = u0 + 0.5 * h * r, u2 = u0 + h * r, x0 = motion.speed[i] * motion.speed[i],
                x2 = motion.speed[i + 1] * motion.speed[i + 1],
                w1 = motion.speed[i] + 0.5 * h * (u0 + 0.25 * h * r),
                x1 = limits_.have_rates() ? w1 * w1 : 0.5 * (x0 + x2);

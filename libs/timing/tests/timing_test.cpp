@@ -169,12 +169,9 @@ TEST_CASE("a motion keeps bounds of jerk and torque rate", "[timing][property]")
                          at.a.cwiseQuotient(limits.acceleration).cwiseAbs().maxCoeff()});
       if (k == 0) CHECK(at.a.norm() < 1e-9);  // accelerations begin and end at zero
       if (k > 0)
-        rates = std::max({rates,
-                          (at.a - before_at.a).cwiseQuotient(h * limits.jerk).cwiseAbs().maxCoeff(),
-                          (tau - tau_before)
-                              .cwiseQuotient(h * limits.torque_rate)
-                              .cwiseAbs()
-                              .maxCoeff()});
+        rates = std::max(
+            {rates, (at.a - before_at.a).cwiseQuotient(h * limits.jerk).cwiseAbs().maxCoeff(),
+             (tau - tau_before).cwiseQuotient(h * limits.torque_rate).cwiseAbs().maxCoeff()});
       before_at = at;
       tau_before = tau;
     }

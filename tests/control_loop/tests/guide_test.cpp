@@ -175,8 +175,11 @@ TEST_CASE("planners that follow no paths are shown their way-points", "[control]
   Loop loop(scene, options);
   control::GuideSearch search(
       loop.arm, loop.controller.world(), loop.controller.view(),
-      control::guide_settings(scene, loop.arm, loop.controller.view(), {}, Json::object()), nullptr,
-      0, 64, false);
+      std::make_unique<control::MotionSearch>(
+          loop.arm,
+          control::guide_settings(scene, loop.arm, loop.controller.view(), {}, Json::object()),
+          nullptr, 0),
+      64, false);
   for (const bool follows : {true, false}) {
     control::Guidance guidance(spec, loop.arm.dof(), 64, follows, false);
     VectorXd q = scene.start_q;

@@ -59,10 +59,9 @@ bool GuideSearch::still_clear() {
 }
 
 void GuideSearch::find(GuideAnswer& out) {
-  MotionSearch::Found found =
-      search_->find({request_.q, {request_.goal}, request_.search,
-                    request_.kept.leftCols(request_.kept_count)},
-                   query_);
+  MotionSearch::Found found = search_->find(
+      {request_.q, {request_.goal}, request_.search, request_.kept.leftCols(request_.kept_count)},
+      query_);
   out.checks += found.checks;
   out.path = std::move(found.path);
   out.motion = std::move(found.motion);

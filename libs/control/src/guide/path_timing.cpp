@@ -17,7 +17,7 @@ namespace {
 // Shares of the limits that a motion uses. The rest is for what keeps the arm on it.
 constexpr double speed_share = 0.99, acceleration_share = 14.0 / 15.0, torque_share_most = 0.9,
                  torque_share_kept = 0.04, least_torque_share = 0.01;
-constexpr double default_acceleration = 15.0;  // [rad/s² or m/s²]
+constexpr double default_acceleration = 20.0;  // [rad/s² or m/s²]
 // Changes of way-points that are tried, what each costs besides proofs in checks, and what these
 // may cost; fewer where checks take longer than so [s]: the arm waits for them.
 constexpr double tries_max = 200.0, improve_checks = 2000.0, usual_check_s = 2e-6;
@@ -59,8 +59,8 @@ timing::Limits limits_of(const scene::Scene& scene, const model::Model& model,
   // what is unknown of friction and masses is left to what keeps the arm on its way
   const scene::SafetyBounds unknown = scene::safety_bounds(scene);
   const double share = std::max(
-      least_torque_share,
-      std::min(torque_share_most, unknown.torque_share - torque_share_kept) - unknown.friction_share);
+      least_torque_share, std::min(torque_share_most, unknown.torque_share - torque_share_kept) -
+                              unknown.friction_share);
   out.acceleration *= 1.0 - unknown.mass_error;
   out.torque = share * modelled.effort_max;
   return out;
@@ -209,7 +209,8 @@ void PathTiming::bound_braking(CertifiedPath& out, Index k) const {
     return std::pair(by_rate(j, i) * rate_at(i) + by_square(j, i) * s * s, by_rate(j, i) * s);
   };
   double& most = out.braking_max[k];
-  const auto bound = [&](const MatrixXd& by_rate, const MatrixXd& by_square, double limit, Index j) {
+  const auto bound = [&](const MatrixXd& by_rate, const MatrixXd& by_square, double limit,
+                         Index j) {
     const auto [value, slope] = row(by_rate, by_square, j, k);
     double change = 0.0, change_of_slope = 0.0;
     for (const Index i : {k - 1, k + 1}) {
@@ -219,7 +220,8 @@ void PathTiming::bound_braking(CertifiedPath& out, Index k) const {
       change = std::max(change, std::abs(other - value) / h);
       change_of_slope = std::max(change_of_slope, std::abs(other_slope - slope) / h);
     }
-    const double left = whole_rate * limit / rate_share - change - out.braking_ramp * std::abs(slope);
+    const double left =
+        whole_rate * limit / rate_share - change - out.braking_ramp * std::abs(slope);
     const double per_braking = 2.0 * std::abs(value) + change_of_slope;
     if (per_braking * most > left) most = std::max(0.0, left / per_braking);
   };

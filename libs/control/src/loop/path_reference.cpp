@@ -55,7 +55,8 @@ const ReferenceState& PathReference::update(const Now& now) {
 }
 
 void PathReference::move_on(double period_s, double rate_max) {
-  const double before = state_.rate, wanted = std::min(rate_max, ReferenceState::rate_for(state_.error));
+  const double before = state_.rate,
+               wanted = std::min(rate_max, ReferenceState::rate_for(state_.error));
   if (wanted > before)
     state_.rate = std::min(wanted, before + period_s * largest_rise(rate_rise_most));
   else

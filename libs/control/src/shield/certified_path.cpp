@@ -23,7 +23,8 @@ constexpr int passes = 2;
 }  // namespace
 
 PathStop::PathStop(Index dof) {
-  for (auto* x : {&e_, &slope_, &bend_, &widest_, &fade_, &end_, &effort_, &acceleration_, &v_, &a_})
+  for (auto* x :
+       {&e_, &slope_, &bend_, &widest_, &fade_, &end_, &effort_, &acceleration_, &v_, &a_})
     x->setZero(dof);
   square_ = bound_ = VectorXd::Zero(static_cast<Index>(pieces_max));
   pieces_.reserve(pieces_max);
@@ -32,8 +33,7 @@ PathStop::PathStop(Index dof) {
 
 PathStop::Piece PathStop::ahead(const Piece& piece, double dt) {
   return {piece.time_s + dt,
-          piece.theta_s +
-              dt * (piece.rate - dt * (0.5 * piece.braking + dt * piece.slope / 6.0)),
+          piece.theta_s + dt * (piece.rate - dt * (0.5 * piece.braking + dt * piece.slope / 6.0)),
           std::max(0.0, piece.rate - dt * (piece.braking + 0.5 * dt * piece.slope)),
           piece.braking + dt * piece.slope, piece.slope};
 }
@@ -165,9 +165,9 @@ void PathStop::set_bounds(double rate, Index end) {
   if (end + 1 < motion.nodes()) bound_[end] = 0.0;
   if (!(rate > 0.0)) return;
   for (Index k = end - 1; k >= first_; --k)  // so early that β can fall
-    bound_[k] = std::min(bound_[k], bound_[k + 1] + path_->braking_ramp *
-                                                        (motion.time_s[k + 1] - motion.time_s[k]) /
-                                                        rate);
+    bound_[k] =
+        std::min(bound_[k], bound_[k + 1] + path_->braking_ramp *
+                                                (motion.time_s[k + 1] - motion.time_s[k]) / rate);
 }
 
 void PathStop::follow_bounds(const Place& from, double braking, Index end) {
@@ -179,7 +179,8 @@ void PathStop::follow_bounds(const Place& from, double braking, Index end) {
   Index k = first_;
   double most = 0.0;
   bool to_rest = false;
-  while (!to_rest && at.rate > 0.0 && at.theta_s < motion.duration_s() && pieces_.size() + 2 < pieces_max) {
+  while (!to_rest && at.rate > 0.0 && at.theta_s < motion.duration_s() &&
+         pieces_.size() + 2 < pieces_max) {
     last_ = k;
     most = std::max(most, at.braking);
     double dt = step;

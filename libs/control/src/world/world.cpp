@@ -234,9 +234,8 @@ std::uint64_t World::move_obstacle(std::string_view name, const geometry::SE3& p
                             "finite numbers",
                             name));
   check_update(obstacles[found]);
-  const std::uint64_t number =
-      publish(latest_->environment.with_obstacles(std::move(obstacles)), latest_->obstacle_ids,
-              changes);
+  const std::uint64_t number = publish(latest_->environment.with_obstacles(std::move(obstacles)),
+                                       latest_->obstacle_ids, changes);
   streams_.erase(latest_->obstacle_ids[found]);
   return number;
 }
@@ -266,9 +265,8 @@ std::uint64_t World::observe_obstacle(std::string_view name, const Observation& 
   obstacle.pose = observation.pose;
   obstacle.motion = observed_motion(obstacle, stream, observation);
   check_update(obstacle);
-  const std::uint64_t number =
-      publish(latest_->environment.with_obstacles(std::move(obstacles)), latest_->obstacle_ids,
-              changes);
+  const std::uint64_t number = publish(latest_->environment.with_obstacles(std::move(obstacles)),
+                                       latest_->obstacle_ids, changes);
   streams_.insert_or_assign(id, stream);
   return number;
 }
@@ -305,7 +303,8 @@ std::uint64_t World::set_map(const std::optional<scene::MapSpec>& map, const Eig
 
 std::uint64_t World::change_map(const scene::MapChangeSpec& change) {
   const std::lock_guard lock(mutex_);
-  return publish(latest_->environment.with_change(change), latest_->obstacle_ids, Changes::standing);
+  return publish(latest_->environment.with_change(change), latest_->obstacle_ids,
+                 Changes::standing);
 }
 
 std::shared_ptr<const WorldSnapshot> World::latest() const {

@@ -27,7 +27,7 @@ struct PlannedGoal {
   /// For each straight line of the path, the smallest distance of the arm from obstacles and from
   /// itself that is proved, but for 0.1 mm [m]; at most 0.2 m.
   std::vector<double> clearance_m;
-  double search_s = 0.0;  ///< CPU time of the search; no result depends on it
+  double search_s = 0.0;                ///< CPU time of the search; no result depends on it
   std::optional<PlannedMotion> motion;  ///< where it is asked for
   std::string motion_cause;             ///< one line: why there is none
 };

@@ -23,9 +23,9 @@ struct Limits {
 };
 
 /// The fastest motion along a curve within the limits, from a speed to rest: docs/theory.md
-/// (19.5)–(19.11), by two passes over the squared speed as in H. Pham, Q.-C. Pham, A New Approach
-/// to Time-Optimal Path Parameterization Based on Reachability Analysis, IEEE Transactions on
-/// Robotics 34(3), 2018, with the limits kept at both ends of each interval and examined between
+/// (19.5)–(19.9), (19.12), by two passes over the squared speed as in H. Pham, Q.-C. Pham, A New
+/// Approach to Time-Optimal Path Parameterization Based on Reachability Analysis, IEEE Transactions
+/// on Robotics 34(3), 2018, with the limits kept at both ends of each interval and examined between
 /// them. Where rates are bounded, that motion is averaged over a window of time. One thread.
 class TimeLaw {
  public:

@@ -7,7 +7,7 @@
 namespace hamelin::timing {
 
 /// A motion along a curve: the third derivative of σ(t) is constant between nodes, and zero where
-/// accelerations may jump; docs/theory.md (19.5), (19.10). It ends at rest.
+/// accelerations may jump; docs/theory.md (19.5), (19.12). It ends at rest.
 struct TimedPath {
   Curve curve;
   Eigen::VectorXd place;   ///< σ of each node
