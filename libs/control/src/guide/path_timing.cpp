@@ -17,7 +17,7 @@ namespace {
 // Shares of the limits that a motion uses. The rest is for what keeps the arm on it.
 constexpr double speed_share = 0.99, acceleration_share = 14.0 / 15.0, torque_share_most = 0.9,
                  torque_share_kept = 0.04, least_torque_share = 0.01;
-constexpr double default_acceleration = 20.0;  // [rad/s² or m/s²]
+constexpr double default_acceleration = 15.0;  // [rad/s² or m/s²]
 // Changes of way-points that are tried, what each costs besides proofs in checks, and what these
 // may cost; fewer where checks take longer than so [s]: the arm waits for them.
 constexpr double tries_max = 200.0, improve_checks = 2000.0, usual_check_s = 2e-6;

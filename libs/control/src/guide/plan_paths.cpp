@@ -58,7 +58,6 @@ Json motion_json(const PlannedMotion& motion) {
   const scene::JointTrajectory points = motion.motion.sampled(document_spacing_s);
   return {{"duration_s", motion.motion.duration_s()},
           {"clearance_m", motion.clearance_m},
-          {"way_points", columns(motion.way_points)},
           {"time_s", std::vector<double>(points.time_s.begin(), points.time_s.end())},
           {"q", columns(points.q)},
           {"v", columns(points.v)},
@@ -98,14 +97,18 @@ PlannedGoal planned(MotionSearch& search, GuideQuery& query, const search::Probl
   MotionSearch::Found found = search.find(problem, query);
   out.search_s = process_cpu_s() - since;
   out.path = std::move(found.path);
+  if (found.motion) {
+    out.path.points = std::move(found.way_points);
+    out.path.length = search::path_length(out.path.points);
+  }
   const Eigen::MatrixXd& points = out.path.points;
   for (Index i = 0; i + 1 < points.cols(); ++i)
     out.clearance_m.push_back(query.proved_clearance(points.col(i), points.col(i + 1)));
   out.motion_cause = std::move(found.cause);
   if (!found.motion) return out;
-  out.motion = PlannedMotion{
-      std::move(found.way_points), std::move(found.motion->motion),
-      std::min(found.motion->clearance_m.minCoeff(), found.motion->self_m.minCoeff())};
+  const CertifiedPath& proved = *found.motion;
+  const double clearance_m = std::min(proved.clearance_m.minCoeff(), proved.self_m.minCoeff());
+  out.motion = PlannedMotion{std::move(found.motion->motion), clearance_m};
   return out;
 }
 
@@ -175,7 +178,7 @@ PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& w
     plan.goals.push_back(planned(search, query, {start, {goal}, plan.goals.size() + 1}));
     const PlannedGoal& found = plan.goals.back();
     if (!found.path.found()) break;
-    start = found.motion ? found.motion->way_points.rightCols(1) : found.path.points.rightCols(1);
+    start = found.path.points.rightCols(1);
   }
   return plan;
 }

@@ -13,9 +13,9 @@
 
 namespace hamelin::control {
 
-/// A motion from rest to rest, all of which is proved to be clear.
+/// A motion from rest to rest along a path whose corners it rounds, all of which is proved to be
+/// clear.
 struct PlannedMotion {
-  Eigen::MatrixXd way_points;  ///< dof × way-points, whose corners the motion rounds
   timing::TimedPath motion;
   double clearance_m = 0.0;  ///< what the arm keeps from obstacles and from itself, at least [m]
 };
@@ -27,9 +27,10 @@ struct PlannedGoal {
   /// For each straight line of the path, the smallest distance of the arm from obstacles and from
   /// itself that is proved, but for 0.1 mm [m]; at most 0.2 m.
   std::vector<double> clearance_m;
-  double search_s = 0.0;                ///< CPU time of the search; no result depends on it
-  std::optional<PlannedMotion> motion;  ///< where it is asked for
-  std::string motion_cause;             ///< one line: why there is none
+  double search_s = 0.0;  ///< CPU time of the search; no result depends on it
+  /// Where it is asked for. The path is then the one along which the fastest motion was found.
+  std::optional<PlannedMotion> motion;
+  std::string motion_cause;  ///< one line: why there is none
 };
 
 /// The paths of a scene's guide, one after the other.
@@ -46,8 +47,7 @@ struct PathPlan {
 
 /// What is asked for.
 struct PlanOptions {
-  /// Motions within the limits of the scene, too: docs/theory.md, chapter 19. Each path is followed
-  /// by the next from where its motion ends.
+  /// Motions within the limits of the scene, too: docs/theory.md, chapter 19.
   bool motions = false;
   /// Called now and then during searches; it may throw to end them.
   std::function<void()> poll = {};
