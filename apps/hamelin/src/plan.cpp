@@ -84,8 +84,8 @@ int plan(PlanOptions options) {
 void add_plan(CLI::App& app, int& exit_code) {
   auto* command =
       add_command(app, "plan",
-                  "Search a proved joint path to each goal of a scene, and a motion along it. The "
-                  "exit code is 1 if there is a goal to which no path was found",
+                  "Search a proved path to each goal of a scene, and a motion along it. "
+                  "The exit code is 1 if there is a goal to which no path was found",
                   "hamelin plan data/scenes/shelf.json -o path.json\n"
                   "hamelin plan data/scenes/shelf.json --format ros -o motion.json\n"
                   "hamelin plan data/scenes/shelf.json --seed 2 --checks 100000 --json");
