@@ -88,6 +88,7 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
     fields["paths"] = paths_json(drawing);
   }
   const auto shield = controller_.shield_report();
+  if (shield && acts) fields["fail_safe"] = shield->along_path ? "path" : "line";
   if (shield && acts && shield->stopping) {
     fields["stop"] = {{"cause", to_string(*shield->cause)}, {"q_end", to_json(*shield->stop_end)}};
     if (shield->evades) fields["stop"]["evades"] = true;

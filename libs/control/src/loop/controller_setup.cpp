@@ -222,6 +222,7 @@ std::optional<ShieldReport> Controller::shield_report() const {
   if (out.stopping) out.cause = shield->refusal().cause;
   out.began = shield->stop_began();
   out.at_rest = shield->stop().at_rest();
+  out.along_path = shield->stop().motion().along_path();
   out.evades = shield->stop().motion().moves();
   out.stop_end = &shield->stop().motion().end();
   out.proof = shield->mover_proof();

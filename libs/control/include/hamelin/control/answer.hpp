@@ -107,8 +107,9 @@ struct ShieldReport {
   bool stopping = false;  ///< whether it refused the last step
   bool began = false;     ///< whether that was the first one of a stop
   /// Of the stop in force, which goes on if the next step is refused: whether its motion has ended,
-  /// whether it moves on after the arm has stopped, and where it ends, until the next tick.
-  bool at_rest = false, evades = false;
+  /// whether it is along a path or else on a straight line, whether it moves on after the arm has
+  /// stopped, and where it ends, until the next tick.
+  bool at_rest = false, along_path = false, evades = false;
   const Eigen::VectorXd* stop_end = nullptr;
   std::optional<StopCause> cause;  ///< of that
   /// What is proved of moving obstacles after the last step; none if there are none in reach.
