@@ -78,8 +78,7 @@ void FilterDrive::set_joint_box(const Pace& pace) {
     const auto [low, high] = joint_bounds(k, pace);
     // The acceleration bound goes last, docs/theory.md (10.12): a limit that cannot be kept is
     // approached with the hardest braking.
-    const double slowest = w_[k] - dt * params_.acceleration_max,
-                 fastest = w_[k] + dt * params_.acceleration_max;
+    const double slowest = w_[k] - dt * pace.acceleration, fastest = w_[k] + dt * pace.acceleration;
     lower_[k] = std::clamp(low, slowest, fastest);
     upper_[k] = std::clamp(high, slowest, fastest);
     if (lower_[k] > upper_[k])
@@ -151,7 +150,7 @@ void FilterDrive::apply(planning::Command& command) {
 // Books the work of the filter, docs/theory.md (10.16), (10.17).
 void FilterDrive::project(planning::Command& command) {
   scratch_ = x_;
-  const auto report = filter_.project(x_, params_.filter_passes);
+  const auto report = filter_.project(x_, filter_passes_);
   held_back_ = (x_ - scratch_).norm() > 1e-3 * horizon_s_ || obstacles_.clearance() < radius_;
   const double share = setup_.control_period_s() / horizon_s_;
   command.set_accounts(share * (report.energy_after_J - report.energy_before_J - report.recovery_J),

@@ -9,7 +9,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-Curve::Curve(Index dof, int degree) : degree_(degree), coefficients_(dof, 0) {}
+Curve::Curve(Index dof, int degree) : dof_(dof), degree_(degree) {}
 
 // docs/theory.md (18.14), (18.15), by powers of the time.
 Curve::Curve(const scene::JointTrajectory& trajectory)
@@ -38,21 +38,18 @@ Curve::Curve(const scene::JointTrajectory& trajectory)
 }
 
 void Curve::add(double length, const MatrixXd& coefficients) {
-  const Index columns = degree_ + 1;
-  coefficients_.conservativeResize(Eigen::NoChange, (pieces_ + 1) * columns);
-  coefficients_.rightCols(columns) = coefficients;
-  ++pieces_;
-  knots_.conservativeResize(pieces_ + 1);
-  knots_[pieces_] = knots_[pieces_ - 1] + length;
+  coefficients_.insert(coefficients_.end(), coefficients.data(),
+                       coefficients.data() + coefficients.size());
+  knots_.push_back(knots_.back() + length);
 }
 
 Index Curve::at(double s, VectorXd& q, VectorXd& dq, VectorXd& ddq, Index first) const {
   s = std::clamp(s, 0.0, end());
-  const double *const knots = knots_.data(), *const last = knots + pieces_,
+  const double *const knots = knots_.data(), *const last = knots + pieces(),
                       *const next =
-                          std::upper_bound(knots + std::min(first, pieces_ - 1) + 1, last, s);
-  const Index piece = std::min(next - knots, pieces_) - 1;
-  const double x = s - knots_[piece];
+                          std::upper_bound(knots + std::min(first, pieces() - 1) + 1, last, s);
+  const Index piece = std::min(next - knots, pieces()) - 1;
+  const double x = s - knots[piece];
   const Index n = dof();
   const double* c = coefficient(piece, degree_);
   for (Index j = 0; j < n; ++j) {
@@ -73,8 +70,8 @@ Index Curve::at(double s, VectorXd& q, VectorXd& dq, VectorXd& ddq, Index first)
 
 bool Curve::is_smooth() const {
   constexpr double rounding = 1e-6;
-  for (Index k = 0; k + 1 < pieces_; ++k) {
-    const double x = knots_[k + 1] - knots_[k];
+  for (Index k = 0; k + 1 < pieces(); ++k) {
+    const double x = knot(k + 1) - knot(k);
     for (Index j = 0; j < dof(); ++j) {
       double before = 0.0;
       for (int power = degree_; power >= 1; --power)
@@ -88,16 +85,16 @@ bool Curve::is_smooth() const {
 
 void Curve::bound_bend(double from, double to, VectorXd& bend) const {
   const double* const knots = knots_.data();
-  Index piece = std::upper_bound(knots + 1, knots + pieces_, from) - knots - 1;
+  Index piece = std::upper_bound(knots + 1, knots + pieces(), from) - knots - 1;
   bend.setZero();
-  for (; piece < pieces_ && knots_[piece] < to; ++piece)
-    include_bend(piece, std::max(from, knots_[piece]), std::min(to, knots_[piece + 1]), bend);
+  for (; piece < pieces() && knots[piece] < to; ++piece)
+    include_bend(piece, std::max(from, knots[piece]), std::min(to, knots[piece + 1]), bend);
 }
 
 // The second derivative is a polynomial of degree three at most: it is within the hull of its
 // Bernstein coefficients.
 void Curve::include_bend(Index piece, double from, double to, VectorXd& bend) const {
-  const double a = from - knots_[piece], h = to - from;
+  const double a = from - knot(piece), h = to - from;
   const auto second = [&](Index j, double x, double& value, double& slope) {
     value = slope = 0.0;
     for (int k = degree_; k >= 2; --k) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -33,6 +34,8 @@ constexpr int window_intervals = 4, averages_max = 16;
 constexpr double ramp_share = 0.8, corrected = 0.99;
 // Averaged motions keep this share of the limits: pieces of the curve meet within their intervals.
 constexpr double averaged_share = 0.995;
+// Of accelerations, with which averaging begins: the fastest result counts.
+constexpr std::array acceleration_shares{1.0, 0.6, 0.35};
 
 void check(const VectorXd& limit, const char* name, Index dof, bool optional) {
   if (optional && limit.size() == 0) return;
@@ -103,13 +106,19 @@ void TimeLaw::evaluate(const Curve& curve, const VectorXd& places, bool torques,
 }
 
 // docs/theory.md (19.6): rows at a node, where x is that of the interval's beginning + lead · u.
-void TimeLaw::add_lines(Index node, double lead, double share, double& x_max) {
+// What does not depend on x is one line.
+void TimeLaw::add_lines(Index node, double lead, double share, Line& level, double& x_max) {
   const auto add = [&](double a, double b, double low, double high) {
     const double slope = a + lead * b, scale = high - low;
     if (std::abs(slope) * squared_speed_max > negligible * scale &&
         std::abs(slope) > negligible * std::abs(b)) {
       const double inverse = 1.0 / slope, p = low * inverse, q = high * inverse;
-      lines_.push_back({std::min(p, q), std::max(p, q), b * inverse});
+      if (b == 0.0) {
+        level.low = std::max(level.low, std::min(p, q));
+        level.high = std::min(level.high, std::max(p, q));
+      } else {
+        lines_.push_back({std::min(p, q), std::max(p, q), b * inverse});
+      }
     } else if (std::abs(b) > 0.0) {
       x_max = std::min(x_max, b > 0.0 ? high / b : low / b);
     }
@@ -119,21 +128,31 @@ void TimeLaw::add_lines(Index node, double lead, double share, double& x_max) {
     add(rows_.inertia(j, node), rows_.bias(j, node), share * (-most - g), share * (most - g));
   }
   for (Index j = 0; j < limits_.acceleration.size(); ++j) {
-    const double most = share * limits_.acceleration[j];
+    const double most = acceleration_share_ * share * limits_.acceleration[j];
     add(rows_.tangent(j, node), rows_.curvature(j, node), -most, most);
   }
 }
 
-void TimeLaw::set_lines(Index interval, double& x_max) {
-  lines_.clear();
-  const double h = places_[interval + 1] - places_[interval];
-  add_lines(interval, 0.0, shares_[interval], x_max);
-  add_lines(interval + 1, 2.0 * h, shares_[interval], x_max);
+void TimeLaw::add_lines(Index interval, double& x_max) {
+  const double h = places_[interval + 1] - places_[interval], share = shares_[interval];
+  Line level{-infinity, infinity, 0.0};
+  first_line_.push_back(lines_.size());
+  add_lines(interval, 0.0, share, level, x_max);
+  add_lines(interval + 1, 2.0 * h, share, level, x_max);
+  lines_.push_back(level);
 }
 
-TimeLaw::Range TimeLaw::range(double x) const {
+// They are appended from the last interval to the first.
+std::span<const TimeLaw::Line> TimeLaw::lines_of(Index interval) const {
+  const std::size_t later = first_line_.size() - 1 - static_cast<std::size_t>(interval),
+                    begin = first_line_[later];
+  return std::span(lines_).subspan(begin,
+                                   (interval > 0 ? first_line_[later + 1] : lines_.size()) - begin);
+}
+
+TimeLaw::Range TimeLaw::range(std::span<const Line> lines, double x) {
   Range out{-infinity, infinity};
-  for (const Line& line : lines_) {
+  for (const Line& line : lines) {
     out.low = std::max(out.low, line.low - line.slope * x);
     out.high = std::min(out.high, line.high - line.slope * x);
   }
@@ -142,12 +161,12 @@ TimeLaw::Range TimeLaw::range(double x) const {
 
 // The width of the range is a concave function of x: from the right, each step goes to where the
 // two lines cross that bound it. Finitely many.
-double TimeLaw::largest(double x_max) const {
+double TimeLaw::largest(std::span<const Line> lines, double x_max) {
   double x = x_max;
-  for (std::size_t i = 0; i <= 2 * lines_.size(); ++i) {
+  for (std::size_t i = 0; i <= 2 * lines.size(); ++i) {
     const Line *low = nullptr, *high = nullptr;
     Range at{-infinity, infinity};
-    for (const Line& line : lines_) {
+    for (const Line& line : lines) {
       if (const double u = line.low - line.slope * x; u > at.low) at.low = u, low = &line;
       if (const double u = line.high - line.slope * x; u < at.high) at.high = u, high = &line;
     }
@@ -175,11 +194,14 @@ bool TimeLaw::backward() {
   }
   controllable_.resize(n);
   controllable_[n - 1] = 0.0;
+  lines_.clear();
+  first_line_.clear();
   for (Index i = n - 2; i >= 0; --i) {
     const double h2 = 2.0 * (places_[i + 1] - places_[i]);
-    set_lines(i, squared_max_[i]);
+    add_lines(i, squared_max_[i]);
     lines_.push_back({0.0, controllable_[i + 1] / h2, 1.0 / h2});
-    controllable_[i] = largest(squared_max_[i]);
+    controllable_[i] = largest(std::span(lines_).subspan(first_line_.back()), squared_max_[i]);
+    lines_.pop_back();
     if (controllable_[i] < 0.0) return false;
   }
   return true;
@@ -197,11 +219,9 @@ bool TimeLaw::forward(TimedPath& out, double speed) {
   out.ramp = VectorXd::Zero(n - 1);
   out.time_s[0] = 0.0;
   out.speed[0] = speed;
-  double unused = infinity;
   for (Index i = 0; i + 1 < n; ++i) {
     const double h2 = 2.0 * (places_[i + 1] - places_[i]);
-    set_lines(i, unused);
-    const Range allowed = range(x);
+    const Range allowed = range(lines_of(i), x);
     const double u = std::min(std::max(allowed.high, -x / h2), (controllable_[i + 1] - x) / h2);
     const double next = std::max(0.0, x + h2 * u);
     out.rate[i] = u;
@@ -260,9 +280,25 @@ bool TimeLaw::solve_with_jumps(TimedPath& out, double speed) {
   return false;
 }
 
+// The larger the accelerations, the longer the window over which they change: neither extreme is
+// the fastest.
+bool TimeLaw::solve_with_ramps(TimedPath& out) {
+  bool found = false;
+  other_.curve = out.curve;
+  for (const double share : acceleration_shares) {
+    acceleration_share_ = share;
+    shares_.setConstant(first_share);
+    if (!average_until_within(other_)) continue;
+    if (!found || other_.duration_s() < out.duration_s()) std::swap(other_, out);
+    found = true;
+  }
+  acceleration_share_ = 1.0;
+  return found;
+}
+
 // Accelerations that are exceeded are lowered where they come from, and the window is made longer
 // until rates are not exceeded.
-bool TimeLaw::solve_with_ramps(TimedPath& out) {
+bool TimeLaw::average_until_within(TimedPath& out) {
   double window_s = least_window_s;
   for (int i = 0; i < averages_max && window_s <= longest_window_s; ++i) {
     if (!pass(trial_, 0.0)) return false;

@@ -97,11 +97,12 @@ class Hybrid final : public planning::Planner {
     follow_gain_ = tuning.follow_gain;
     drive_acceleration_ = tuning.drive_acceleration;
     acceleration_max_ = tuning.acceleration_max;
+    path_acceleration_ = tuning.path_acceleration;
     brake_ = tuning.brake_acceleration;
     rate_ = tuning.approach_rate;
     joint_damping_ = tuning.joint_damping;
     stall_.set_stall_time(tuning.stall_time_s);
-    drive_.set_params({acceleration_max_, tuning.filter_passes});
+    drive_.set_filter_passes(tuning.filter_passes);
     evader_.set_params(
         {velocity_gain_, follow_gain_, drive_acceleration_, acceleration_max_, rate_},
         tuning.look_budget, tuning.look_steps);
@@ -155,7 +156,7 @@ class Hybrid final : public planning::Planner {
            acceleration = drive_acceleration_;
     if ((follows() && mode_ == Mode::goal) || tracks_) gain = target_velocity_gain_;
     if (certified_) gain = certified_gain();
-    if (tracks_) acceleration = acceleration_max_;
+    if (tracks_) acceleration = pace().acceleration;
     if (evader_.evades()) gain = evasion_gain, acceleration = evasion_acceleration;
     // A reference accelerates as the motors can, so the velocity that counts is the present one.
     drive_.accelerate(u_, tracks_ ? drive_.v() : drive_.coasting_velocity(), gain, acceleration);
@@ -321,9 +322,10 @@ class Hybrid final : public planning::Planner {
 
   // How fast limits are approached: a trajectory was planned to be clear.
   [[nodiscard]] Pace pace() const {
-    if (!tracks_) return {brake_, rate_, 0.5 * acceleration_max_};
-    const double rate = track_rate_within(drive_.horizon_s());
-    return {track_brake, rate, acceleration_max_, rate};
+    if (!tracks_) return {acceleration_max_, brake_, rate_, 0.5 * acceleration_max_};
+    const double rate = track_rate_within(drive_.horizon_s()),
+                 acceleration = certified_ ? path_acceleration_ : acceleration_max_;
+    return {acceleration, track_brake, rate, acceleration, rate};
   }
 
   void drive(planning::Command& command) {
@@ -506,8 +508,8 @@ class Hybrid final : public planning::Planner {
   std::unique_ptr<Steering> steering_;
   std::int32_t turn_series_ = -1;
   double velocity_gain_ = 0.0, follow_gain_ = 0.0, target_velocity_gain_ = 1.0,
-         tracking_gain_ = 0.0, drive_acceleration_ = 0.0, acceleration_max_ = 0.0, brake_ = 0.0,
-         rate_ = 0.0, joint_damping_ = 0.0, contact_radius_;
+         tracking_gain_ = 0.0, drive_acceleration_ = 0.0, acceleration_max_ = 0.0,
+         path_acceleration_ = 0.0, brake_ = 0.0, rate_ = 0.0, joint_damping_ = 0.0, contact_radius_;
   bool asks_, searches_ = false;  ///< for paths; and may still do so at this goal
   planning::JointPath path_;
   VectorXd u_, via_, lower_, upper_;

@@ -46,6 +46,7 @@ Tuning::Tuning(const planning::Setup& setup, const Json& params)
       target_velocity_gain(params["target_velocity_gain"]),
       drive_acceleration(params["drive_acceleration"]),
       acceleration_max(params["acceleration_max"]),
+      path_acceleration(params["path_acceleration"]),
       brake_acceleration(params["brake_acceleration"]),
       approach_rate(params["approach_rate"]),
       joint_damping(params["joint_damping"]),

@@ -13,7 +13,7 @@ struct Tuning {
   MarginParams margins;
   FollowParams follow;
   double velocity_gain, follow_gain, target_velocity_gain, drive_acceleration, acceleration_max,
-      brake_acceleration, approach_rate, joint_damping, stall_time_s;
+      path_acceleration, brake_acceleration, approach_rate, joint_damping, stall_time_s;
   int filter_passes, look_budget, look_steps;
 };
 

@@ -17,11 +17,11 @@ namespace {
 // Shares of the limits that a motion uses. The rest is for what keeps the arm on it.
 constexpr double speed_share = 0.99, acceleration_share = 14.0 / 15.0, torque_share_most = 0.9,
                  torque_share_kept = 0.04, least_torque_share = 0.01;
-constexpr double default_acceleration = 15.0;  // [rad/s² or m/s²]
+constexpr double default_acceleration = 40.0;  // [rad/s² or m/s²]
 // Changes of way-points that are tried, what each costs besides proofs in checks, and what these
 // may cost; fewer where checks take longer than so [s]: the arm waits for them.
-constexpr double tries_max = 200.0, improve_checks = 2000.0, usual_check_s = 2e-6;
-constexpr long checks_per_try = 5;
+constexpr double tries_max = 250.0, improve_checks = 1000.0, usual_check_s = 2e-6;
+constexpr long checks_per_try = 8;
 // Of bounds of rates, the shares that a motion uses, the change of a stop's braking, and both with
 // the braking; and the largest such change, where the bounds do not say it [1/s²].
 constexpr double rate_share = 0.5, ramp_share = 0.2, whole_rate = 0.9, braking_ramp_most = 2000.0;
@@ -38,6 +38,21 @@ constexpr long places_per_check = 8;
 constexpr int mass_places = 5;
 constexpr double mass_between = 1.1;
 
+// docs/theory.md (19.14): where rates are bounded, larger accelerations take longer to be reached.
+void lower_acceleration(const scene::Scene& scene, const model::Model& model,
+                        timing::Limits& limits) {
+  VectorXd jerk = VectorXd::Constant(model.dof(), infinity);
+  if (limits.jerk.size() > 0) jerk = limits.jerk;
+  if (limits.torque_rate.size() > 0) {
+    dynamics::Workspace ws(model);
+    MatrixXd M(model.dof(), model.dof());
+    dynamics::mass_matrix(
+        model, ws, scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(model.dof()), M);
+    jerk = jerk.cwiseMin(limits.torque_rate.cwiseQuotient(M.diagonal()));
+  }
+  limits.acceleration = limits.acceleration.cwiseMin((0.5 * jerk).array().pow(2.0 / 3).matrix());
+}
+
 timing::Limits limits_of(const scene::Scene& scene, const model::Model& model,
                          const PathTiming::Bounds& bounds) {
   const auto& [reserve, params, changes] = bounds;
@@ -46,7 +61,7 @@ timing::Limits limits_of(const scene::Scene& scene, const model::Model& model,
   out.velocity = modelled.velocity_max;
   if (reserve.velocity.size() == out.velocity.size()) out.velocity -= reserve.velocity;
   out.velocity *= speed_share;
-  const auto found = params.find("acceleration_max");
+  const auto found = params.find("path_acceleration");
   const double most =
       found != params.end() && found->is_number() ? found->get<double>() : default_acceleration;
   out.acceleration = VectorXd::Constant(model.dof(), most);
@@ -63,6 +78,7 @@ timing::Limits limits_of(const scene::Scene& scene, const model::Model& model,
                               unknown.friction_share);
   out.acceleration *= 1.0 - unknown.mass_error;
   out.torque = share * modelled.effort_max;
+  if (out.have_rates()) lower_acceleration(scene, model, out);
   return out;
 }
 
@@ -200,13 +216,11 @@ void PathTiming::set_braking(CertifiedPath& out) const {
 
 void PathTiming::bound_braking(CertifiedPath& out, Index k) const {
   const timing::TimedPath& motion = out.motion;
-  const auto rate_at = [&](Index i) {
-    return i + 1 < motion.nodes() ? motion.rate[i] : motion.rate_at_end(i - 1);
-  };
   // what a row is without braking, and with it per β, at a node
   const auto row = [&](const MatrixXd& by_rate, const MatrixXd& by_square, Index j, Index i) {
     const double s = motion.speed[i];
-    return std::pair(by_rate(j, i) * rate_at(i) + by_square(j, i) * s * s, by_rate(j, i) * s);
+    return std::pair(by_rate(j, i) * motion.rate_at(i) + by_square(j, i) * s * s,
+                     by_rate(j, i) * s);
   };
   double& most = out.braking_max[k];
   const auto bound = [&](const MatrixXd& by_rate, const MatrixXd& by_square, double limit,

@@ -23,7 +23,7 @@ class PathTiming {
   /// has to change them.
   struct Bounds {
     LimitReserve reserve;  ///< what a shield keeps
-    Json params;           ///< of the planner, for acceleration_max
+    Json params;           ///< of the planner, for path_acceleration
     ChangeBounds changes;  ///< of the drives
   };
   /// @param model kept by reference @param self null if self-collision is not modelled

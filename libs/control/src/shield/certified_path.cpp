@@ -17,6 +17,8 @@ constexpr std::size_t pieces_max = 4096;
 // Braking is planned for this much of the path; a stop that is not at rest there does not brake
 // behind it [s].
 constexpr double looked_ahead_s = 0.4;
+// The share of torques that is used at the nodes of a path: they rise a little between them.
+constexpr double at_nodes = 0.995;
 // Bounds of ρ become tighter by each pass over the nodes.
 constexpr int passes = 2;
 
@@ -95,7 +97,7 @@ void PathStop::set(const CertifiedPath& path, const Place& from, const Deviation
   path_ = &path;
   const bool jumps = path.braking_ramp == 0.0;
   set_deviation(deviation, jumps);
-  effort_ = bounds.effort_max;
+  effort_ = at_nodes * bounds.effort_max;
   if (effort_.size() > 0) effort_.noalias() -= path.mass * fade_;
   acceleration_ = path.stop_acceleration;
   if (acceleration_.size() > 0) acceleration_ -= fade_;
@@ -157,9 +159,8 @@ void PathStop::brake_with_ramps(const Place& from, double braking) {
 void PathStop::set_bounds(double rate, Index end) {
   const timing::TimedPath& motion = path_->motion;
   for (Index k = first_; k <= end; ++k) {
-    const double u = k + 1 < motion.nodes() ? motion.rate[k] : motion.rate_at_end(k - 1);
     double most = std::min(rate_max_, path_->braking_max[k]);
-    bound_by(k, u, square_[k], 0.0, most);
+    bound_by(k, motion.rate_at(k), square_[k], 0.0, most);
     bound_[k] = std::max(0.0, most);
   }
   if (end + 1 < motion.nodes()) bound_[end] = 0.0;
@@ -173,8 +174,7 @@ void PathStop::set_bounds(double rate, Index end) {
 void PathStop::follow_bounds(const Place& from, double braking, Index end) {
   const timing::TimedPath& motion = path_->motion;
   const double ramp = path_->braking_ramp, step = motion.time_s[1] - motion.time_s[0];
-  Piece at{0.0, from.time_s, from.rate,
-           std::clamp(braking, 0.0, std::min(bound_[first_], bound_[first_ + 1])), 0.0};
+  Piece at{0.0, from.time_s, from.rate, braking, 0.0};
   pieces_.clear();
   Index k = first_;
   double most = 0.0;

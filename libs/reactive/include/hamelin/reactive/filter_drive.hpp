@@ -13,16 +13,12 @@
 
 namespace hamelin::reactive {
 
-/// How fast obstacles and joint limits are approached: a deceleration and a rate each,
-/// docs/theory.md (10.10).
+/// How fast an arm may become faster or slower, and how fast obstacles and joint limits are
+/// approached: a deceleration and a rate each, docs/theory.md (10.10).
 struct Pace {
+  double acceleration = 15.0;                  ///< of the joints, at most [rad/s² or m/s²]
   double brake = 3.0, rate = 16.0;             ///< of obstacles [m/s²], [1/s]
   double joint_brake = 7.5, joint_rate = 8.0;  ///< of joint limits [rad/s² or m/s²], [1/s]
-};
-
-struct FilterDriveParams {
-  double acceleration_max = 15.0;  ///< of the joints [rad/s² or m/s²]
-  int filter_passes = 12;
 };
 
 /// Drives an arm by a desired joint velocity under the safety filter, within the limits of joints
@@ -35,7 +31,7 @@ class FilterDrive {
   ///        actuation is sampled
   FilterDrive(const planning::Setup& setup, const model::Model& model, double radius_m,
               double horizon_s);
-  void set_params(const FilterDriveParams& params) noexcept { params_ = params; }
+  void set_filter_passes(int passes) noexcept { filter_passes_ = passes; }
 
   /// Takes the state of a tick, its dynamics and its near points.
   void update(const planning::Tick& tick);
@@ -89,7 +85,7 @@ class FilterDrive {
   const planning::Setup setup_;
   const model::Model& model_;
   dynamics::Workspace ws_;
-  FilterDriveParams params_;
+  int filter_passes_ = 12;
   double radius_, horizon_s_;
   Inertia inertia_;
   Obstacles obstacles_;

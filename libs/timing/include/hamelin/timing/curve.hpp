@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <vector>
 
 #include "hamelin/scene/joint_trajectory.hpp"
 
@@ -21,12 +22,14 @@ class Curve {
   /// Appends a piece. @param coefficients dof × (degree + 1): of (σ − its beginning)^k
   void add(double length, const Eigen::MatrixXd& coefficients);
 
-  [[nodiscard]] Eigen::Index dof() const noexcept { return coefficients_.rows(); }
-  [[nodiscard]] Eigen::Index pieces() const noexcept { return pieces_; }
+  [[nodiscard]] Eigen::Index dof() const noexcept { return dof_; }
+  [[nodiscard]] Eigen::Index pieces() const noexcept {
+    return static_cast<Eigen::Index>(knots_.size()) - 1;
+  }
   [[nodiscard]] int degree() const noexcept { return degree_; }
   /// Where a piece begins; at(pieces()) is where the last one ends.
-  [[nodiscard]] double knot(Eigen::Index k) const { return knots_[k]; }
-  [[nodiscard]] double end() const { return knots_[pieces_]; }
+  [[nodiscard]] double knot(Eigen::Index k) const { return knots_[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] double end() const { return knots_.back(); }
   /// Position and its first and second derivative by σ, which is clamped to the curve. No
   /// allocation if the vectors have dof numbers.
   /// @param first a piece that does not begin after σ @return the piece
@@ -41,13 +44,13 @@ class Curve {
   /// Raises it to the bound on one piece.
   void include_bend(Eigen::Index piece, double from, double to, Eigen::VectorXd& bend) const;
   [[nodiscard]] const double* coefficient(Eigen::Index piece, int power) const {
-    return coefficients_.data() + (piece * (degree_ + 1) + power) * dof();
+    return coefficients_.data() + (piece * (degree_ + 1) + power) * dof_;
   }
 
+  Eigen::Index dof_ = 0;
   int degree_ = 1;
-  Eigen::Index pieces_ = 0;
-  Eigen::VectorXd knots_ = Eigen::VectorXd::Zero(1);
-  Eigen::MatrixXd coefficients_;  ///< dof × (degree + 1) pieces, by powers within a piece
+  std::vector<double> knots_{0.0};
+  std::vector<double> coefficients_;  ///< dof × (degree + 1) pieces, by powers within a piece
 };
 
 }  // namespace hamelin::timing

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -70,17 +71,20 @@ class TimeLaw {
   void add_nodes(double from, double to, Eigen::Index count);
   /// @param torques whether A, B and g are needed
   void evaluate(const Curve& curve, const Eigen::VectorXd& places, bool torques, Rows& out);
-  /// The rows of one interval; tightens the bound of x.
-  void set_lines(Eigen::Index interval, double& x_max);
-  void add_lines(Eigen::Index node, double lead, double share, double& x_max);
-  [[nodiscard]] Range range(double x) const;
-  [[nodiscard]] double largest(double x_max) const;
+  /// Appends the rows of an interval; tightens the bound of x.
+  void add_lines(Eigen::Index interval, double& x_max);
+  void add_lines(Eigen::Index node, double lead, double share, Line& level, double& x_max);
+  [[nodiscard]] std::span<const Line> lines_of(Eigen::Index interval) const;
+  [[nodiscard]] static Range range(std::span<const Line> lines, double x);
+  /// The largest x at which there is a u.
+  [[nodiscard]] static double largest(std::span<const Line> lines, double x_max);
   /// The two passes, with shares_ of the limits.
   [[nodiscard]] bool pass(TimedPath& out, double speed);
   [[nodiscard]] bool backward();
   [[nodiscard]] bool forward(TimedPath& out, double speed);
   [[nodiscard]] bool solve_with_jumps(TimedPath& out, double speed);
   [[nodiscard]] bool solve_with_ramps(TimedPath& out);
+  [[nodiscard]] bool average_until_within(TimedPath& out);
   /// What the motion uses of its limits on an interval, as factors; ramp: by d³σ/dt³ alone.
   struct Used {
     double values = 0.0, rates = 0.0, ramp = 0.0;
@@ -106,7 +110,10 @@ class TimeLaw {
   Rows rows_, between_, averaged_;
   dynamics::StatesXd q_, zero_;
   std::vector<Line> lines_;
+  std::vector<std::size_t> first_line_;
   TimedPath trial_;  ///< without a curve
+  TimedPath other_;
+  double acceleration_share_ = 1.0;
 };
 
 }  // namespace hamelin::timing

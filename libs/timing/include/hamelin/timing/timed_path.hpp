@@ -23,6 +23,10 @@ struct TimedPath {
   [[nodiscard]] bool empty() const noexcept { return place.size() == 0; }
   [[nodiscard]] Eigen::Index nodes() const noexcept { return place.size(); }
   [[nodiscard]] double duration_s() const { return time_s[nodes() - 1]; }
+  /// d²σ/dt² behind a node; at the last one, before it.
+  [[nodiscard]] double rate_at(Eigen::Index node) const {
+    return node + 1 < nodes() ? rate[node] : rate_at_end(node - 1);
+  }
   /// d²σ/dt² before the node behind an interval.
   [[nodiscard]] double rate_at_end(Eigen::Index interval) const {
     return rate[interval] + ramp[interval] * (time_s[interval + 1] - time_s[interval]);
