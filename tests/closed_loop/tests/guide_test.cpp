@@ -1,7 +1,10 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "hamelin/control/plan_paths.hpp"
+#include "hamelin/control/preparation.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/search/search.hpp"
@@ -111,6 +114,46 @@ TEST_CASE("a guided run whose map changes in its way searches again", "[closed_l
   REQUIRE(away.guide);
   CHECK(away.guide->kept == 1);
   CHECK(away.guide->searches == 5);
+}
+
+TEST_CASE("maps that change in the way of a proved path stop the arm, or lead it around",
+          "[closed_loop][guide]") {
+  const std::string sampled = R"(/actuation={"type": "sampled", "control_period_s": 0.001})";
+  const std::vector<Json> ticks = logged_ticks({sampled});
+  const scene::Scene scene = shelf({});
+  const model::Model arm = control::load_model(scene);
+  dynamics::Workspace ws(arm);
+  const auto tip_at = [&](double time_s) {
+    const auto at = std::find_if(ticks.begin(), ticks.end(), [&](const Json& line) {
+      return line["type"] == "tick" && line["time_s"] >= time_s;
+    });
+    REQUIRE(at != ticks.end());
+    const auto q = (*at)["q"].get<std::vector<double>>();
+    dynamics::forward_kinematics(arm, ws, Eigen::Map<const Eigen::VectorXd>(q.data(), arm.dof()));
+    return Eigen::Vector3d(dynamics::tip_pose(arm, ws).p());
+  };
+  int blocked = 0, reached = 0, led_around = 0;
+  for (int k = 0; k < 20; ++k) {
+    const double time_s = 0.1 + 0.2 * k;
+    CAPTURE(time_s);
+    const Eigen::Vector3d tip = tip_at(time_s + 0.25);
+    if ((tip - tip_at(time_s)).norm() < 0.15) continue;  // in or beside the arm as it is
+    ++blocked;
+    Json box = Json::array();
+    for (const double half : {-0.015, 0.015})
+      for (int i = 0; i < 3; ++i) box.push_back(tip[i] + half);
+    const Json change{{{"time_s", time_s}, {"occupied_boxes_m", Json::array({box})}}};
+    const log::Result result = run({sampled, "/map/changes=" + change.dump(), "/duration_s=8"});
+    REQUIRE(result.shield);
+    CHECK((result.outcome != log::Outcome::collision || result.shield->overtaken > 0));
+    if (result.outcome == log::Outcome::collision) continue;
+    CHECK(result.certified_share == 1.0);
+    reached += result.outcome == log::Outcome::reached ? 1 : 0;
+    led_around += result.guide->searches > 5 ? 1 : 0;
+  }
+  CHECK(blocked >= 6);
+  CHECK(2 * reached > blocked);
+  CHECK(2 * led_around > blocked);
 }
 
 TEST_CASE("plans have a certificate for each line and chain from goal to goal",

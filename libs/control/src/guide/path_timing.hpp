@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "guide/guide_query.hpp"
+#include "guide/path_certifier.hpp"
 #include "hamelin/control/planner_setup.hpp"
-#include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/levers.hpp"
 #include "hamelin/timing/blended_path.hpp"
 #include "hamelin/timing/time_law.hpp"
@@ -49,32 +49,19 @@ class PathTiming {
   [[nodiscard]] long checks() const noexcept { return checks_; }
 
  private:
-  void set_margins(CertifiedPath& out, const search::Margins& margins);
-  /// Near a tight start or goal paths are proved with less than there is.
-  void raise_margins(CertifiedPath& out, search::Query& query);
-  void set_room(CertifiedPath& out);
-  void set_mass(CertifiedPath& out);
-  /// How stops may brake where rates are bounded.
-  void set_braking(CertifiedPath& out) const;
-  void bound_braking(CertifiedPath& out, Eigen::Index node) const;
-
-  const model::Model& model_;
   timing::Limits limits_;
   Eigen::VectorXd stop_acceleration_;
-  double enough_m_;
   scene::Levers levers_;
   timing::Blending blending_;
   timing::WayPoints way_points_;
   timing::TimeLaw law_;
+  PathCertifier certifier_;
   timing::WayPoints::Effort effort_;
   std::uint64_t seed_;
   Rng rng_{0};
   std::optional<timing::BlendedPath> best_;
   std::optional<search::Margins> margins_;
   double best_s_ = 0.0;
-  Eigen::VectorXd q_lower_, q_upper_;
-  dynamics::Workspace ws_;
-  Eigen::VectorXd from_, to_, stray_;
   long checks_ = 0;
 };
 

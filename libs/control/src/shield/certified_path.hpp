@@ -21,6 +21,8 @@ struct CertifiedPath {
   timing::Limits limits;  ///< that it keeps
   /// What stops may use of accelerations [rad/s² or m/s²]; of size zero: no bound.
   Eigen::VectorXd stop_acceleration;
+  /// The share of bounded rates that the motion uses; the rest is for stops and feedback.
+  static constexpr double rate_share = 0.5;
   /// Where changes of torques or accelerations are bounded, the rate at which β may change [1/s²],
   /// and its bound at each node [1/s]: docs/theory.md (14.37). Else zero, and of size zero.
   double braking_ramp = 0.0;
