@@ -133,7 +133,8 @@ TEST_CASE("bounds from anchors are below the distances themselves", "[shield][sl
       const LineCheck::End from{q, arm_from.view()}, to{end, arm_to.view()};
       const double margin = 0.002;
       const bool proved =
-          !line.check(ws, &environment, 0.0, from, to, {none, no_addition, margin}).has_value();
+          !line.check(ws, &environment, 0.0, from, to, {none, no_addition, no_addition, margin})
+               .has_value();
       ++lines;
       clear += proved ? 1 : 0;
       for (std::size_t s = 0; s < model.shapes().size(); ++s) {
@@ -184,7 +185,7 @@ TEST_CASE("an arm that is nearer than its margin may only move away", "[shield]"
     dynamics::forward_kinematics(model, ws, p);
     arm_to.place(model, ws);
     const auto blocker = line.check(ws, &environment, 0.0, {q, arm_from.view()}, {p, arm_to.view()},
-                                    {none, no_addition, 0.05});
+                                    {none, no_addition, no_addition, 0.05});
     if (blocker) CHECK(blocker->obstacle == 0);
     return !blocker.has_value();
   };

@@ -140,8 +140,7 @@ std::optional<LineCheck::Blocker> LineCheck::check(dynamics::Workspace& ws,
   Blocker blocker;
   pair_stray_.noalias() = levers_.pairs() * stray.joints;
   if (stray.shapes_m.size() > 0)
-    for (Index k = 0; k < pair_stray_.size(); ++k)
-      pair_stray_[k] += pair_addition(static_cast<std::size_t>(k), stray.shapes_m);
+    for (Index k = 0; k < pair_stray_.size(); ++k) pair_stray_[k] += pair_addition(k, stray);
   for (std::size_t k = 0; k < static_cast<std::size_t>(pair_stray_.size()); ++k)
     if (!pair_is_clear(k, blocker)) return blocker;
   if (obstacles_ == nullptr) return std::nullopt;
@@ -159,21 +158,21 @@ double LineCheck::largest_pair_stray(const Stray& stray) const {
   double most = 0.0;
   for (Index k = 0; k < levers_.pairs().rows(); ++k)
     most = std::max(most, levers_.pairs().row(k).dot(stray.joints) +
-                              (stray.shapes_m.size() > 0
-                                   ? pair_addition(static_cast<std::size_t>(k), stray.shapes_m)
-                                   : 0.0));
+                              (stray.shapes_m.size() > 0 ? pair_addition(k, stray) : 0.0));
   return most + stray.margin_m;
 }
 
-double LineCheck::pair_addition(std::size_t pair, const VectorXd& shapes_m) const {
+// docs/theory.md (14.40): by the joints between the parts, or by all that moves either of them.
+double LineCheck::pair_addition(Index pair, const Stray& stray) const {
   const auto largest = [&](int part) {
     double most = 0.0;
     for (const int s : self_->parts()[static_cast<std::size_t>(part)].shapes)
-      if (s >= 0) most = std::max(most, shapes_m[s]);
+      if (s >= 0) most = std::max(most, stray.shapes_m[s]);
     return most;
   };
-  const auto& both = self_->pairs()[pair];
-  return largest(both.part_a) + largest(both.part_b);
+  const auto& both = self_->pairs()[static_cast<std::size_t>(pair)];
+  return std::min(levers_.pairs().row(pair).dot(stray.errors),
+                  largest(both.part_a) + largest(both.part_b));
 }
 
 double LineCheck::need(std::size_t shape, int pieces) const {

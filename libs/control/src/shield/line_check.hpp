@@ -48,6 +48,7 @@ class LineCheck {
   struct Stray {
     const Eigen::VectorXd& joints;    ///< σ [rad or m]
     const Eigen::VectorXd& shapes_m;  ///< of each shape, in addition; of size zero: none
+    const Eigen::VectorXd& errors;    ///< of each joint, that move the shapes by these [rad or m]
     double margin_m = 0.0;            ///< distance that must remain to obstacles and between parts
   };
   /// @param obstacles null: only pairs of parts are checked
@@ -87,7 +88,7 @@ class LineCheck {
   static constexpr int pieces_max = 16;
 
   /// The largest addition of two shapes that belong to a pair of parts.
-  [[nodiscard]] double pair_addition(std::size_t pair, const Eigen::VectorXd& shapes_m) const;
+  [[nodiscard]] double pair_addition(Eigen::Index pair, const Stray& stray) const;
   /// How far shape i may be from its anchor's chord.
   [[nodiscard]] double moved(std::size_t shape, const scene::Shapes& from,
                              const scene::Shapes& to) const;

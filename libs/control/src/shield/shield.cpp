@@ -286,7 +286,7 @@ void Shield::check_overtaken(const Surroundings& world, const Node& node) {
     const LineCheck::End from = place(way_, arm_from_), to = place(q, arm_end_);
     blocked = blocked || stop_line_
                              .check(ws_, &world.environment, world.time_s, from, to,
-                                    {zero_, no_addition_, 0.0})
+                                    {zero_, no_addition_, no_addition_, 0.0})
                              .has_value();
     way_ = q;
   };
@@ -335,9 +335,9 @@ bool Shield::within_joint_limits(const Step& step) {
 
 bool Shield::is_clear(LineCheck& line, const Surroundings& world, const LineCheck::End& from,
                       const LineCheck::End& to, const VectorXd& stray, double more_m) {
-  const auto blocker =
-      line.check(ws_, world.environment.has_obstacles() ? &world.environment : nullptr,
-                 world.time_s, from, to, {stray, straying_.shapes(), margin_m_ + more_m});
+  const auto blocker = line.check(
+      ws_, world.environment.has_obstacles() ? &world.environment : nullptr, world.time_s, from, to,
+      {stray, straying_.shapes(), straying_.errors(), margin_m_ + more_m});
   if (!blocker) return true;
   refusal_ = {cause_of(*blocker), *blocker, -1};
   return false;
@@ -418,7 +418,8 @@ void Shield::set_reserve(const scene::Scene& scene, const VectorXd& q) {
         reserve_.obstacles_m, margin_m_ + levers_.shapes().row(s).dot(tracking) +
                                   (straying_.shapes().size() > 0 ? straying_.shapes()[s] : 0.0));
   if (self_ != nullptr)
-    reserve_.self_m = stop_line_.largest_pair_stray({tracking, straying_.shapes(), margin_m_});
+    reserve_.self_m = stop_line_.largest_pair_stray(
+        {tracking, straying_.shapes(), straying_.errors(), margin_m_});
   speed_max_ = limits_.velocity_max;
   if (speed_max_.size() == 0) return;
   // of joints that have a limit

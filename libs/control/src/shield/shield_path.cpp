@@ -87,7 +87,7 @@ bool Shield::within_tube(const Straying::Bounds& stray, Index first, Index last)
                               (stray.shapes.size() > 0 ? stray.shapes[s] : 0.0));
   if (most + margin_m_ < path_proof_.clearance_m(first, last) &&
       (self_ == nullptr ||
-       stop_line_.largest_pair_stray({stray.tracking, stray.shapes, margin_m_}) <
+       stop_line_.largest_pair_stray({stray.tracking, stray.shapes, stray.errors, margin_m_}) <
            path_proof_.self_m(first, last)))
     return true;
   refusal_ = {StopCause::map, {0, scene::Contact::map, -1, 0.0}, -1};
