@@ -84,6 +84,7 @@ class TimeLaw {
   [[nodiscard]] bool forward(TimedPath& out, double speed);
   [[nodiscard]] bool solve_with_jumps(TimedPath& out, double speed);
   [[nodiscard]] bool solve_with_ramps(TimedPath& out);
+  /// The averaged motion, with acceleration_share_ of the accelerations at first.
   [[nodiscard]] bool average_until_within(TimedPath& out);
   /// What the motion uses of its limits on an interval, as factors; ramp: by d³σ/dt³ alone.
   struct Used {
@@ -110,9 +111,9 @@ class TimeLaw {
   Rows rows_, between_, averaged_;
   dynamics::StatesXd q_, zero_;
   std::vector<Line> lines_;
-  std::vector<std::size_t> first_line_;
-  TimedPath trial_;  ///< without a curve
-  TimedPath other_;
+  std::vector<std::size_t> first_line_;  ///< of each interval, from the last to the first
+  TimedPath trial_;                      ///< without a curve
+  TimedPath other_;                      ///< an averaged motion beside the best
   double acceleration_share_ = 1.0;
 };
 
