@@ -73,6 +73,7 @@ Json times(const std::optional<Result::TickTime>& t) {
 Json timing(const Result& r) {
   return {{"cpu_s", r.cpu_s},
           {"tick_us", times(r.tick_us)},
+          {"controller_wall_us", times(r.controller_us)},
           {"planner_wall_us", times(r.planner_us)},
           {"deadline_us", optional(r.deadline_us)},
           {"late_ticks", r.deadline_us ? Json(r.late_ticks) : Json(nullptr)}};

@@ -316,6 +316,9 @@ bool Plugin::follows_paths() const noexcept {
 bool Plugin::asks_for_paths() const noexcept {
   return (library_->raw->properties & HAMELIN_ASKS_FOR_PATHS) != 0;
 }
+bool Plugin::trusts_certified_paths() const noexcept {
+  return (library_->raw->properties & HAMELIN_TRUSTS_CERTIFIED_PATHS) != 0;
+}
 bool Plugin::can_change_params() const noexcept {
   return library_->raw->prepare_params != nullptr;
 }

@@ -13,7 +13,7 @@ import hamelin
 import numpy as np
 import pytest
 
-CLOCK = {"timing", "cpu_s", "tick_us", "planner_us", "deadline_us", "late_ticks", "provenance"}
+CLOCK = {"timing", "cpu_s", "tick_us", "controller_us", "planner_us", "deadline_us", "late_ticks", "provenance"}
 
 
 def lines_of(file):

@@ -126,7 +126,9 @@ void ClosedLoop::let_controller_observe() {
   observed_k_ = plant_->node().k;
   if (feed_) feed_target();
   actuation_->observe(q_shown_, v_shown_);
+  const double since_s = control::steady_clock_s();
   controller_->observe(plant_->node().time_s, q_shown_, v_shown_);
+  observing_s_ = control::steady_clock_s() - since_s;
   const control::GoalTracker& goals = controller_->goals();
   while (goals_reached_ < goals.index())
     recorder_->event(plant_->node().time_s,
@@ -156,12 +158,14 @@ void ClosedLoop::note_tracking() {
 }
 
 void ClosedLoop::ask_planner() {
+  const double since_s = control::steady_clock_s();
   try {
     controller_->decide();
   } catch (const Error& e) {
     if (e.code() != ErrorCode::invalid || plant_->node().k > 0) throw;
     return finish(log::Outcome::refused, e.what());
   }
+  recorder_->controller_time(observing_s_ + control::steady_clock_s() - since_s);
   recorder_->planner_time(controller_->answer().planner_s);
   if (planner_answered() && controller_->answer().state == control::ControlState::gave_up)
     finish(log::Outcome::stalled, std::string(controller_->answer().cause));

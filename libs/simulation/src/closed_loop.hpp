@@ -143,6 +143,7 @@ class ClosedLoop {
   std::vector<scene::Payload> carried_;  ///< attached by events
   std::uint64_t expected_load_ = 0;      ///< of the event that has begun; 0: none has
   long observed_k_ = -1;                 ///< the step at which the controller last looked
+  double observing_s_ = 0.0;             ///< that this took
 };
 
 }  // namespace hamelin::simulation

@@ -145,6 +145,7 @@ void Recorder::close(const Ledger& ledger) {
     return log::Result::TickTime{us.quantile(0.5), us.quantile(0.99), us.largest()};
   };
   result_.tick_us = times(tick_us_);
+  result_.controller_us = times(controller_us_);
   result_.planner_us = times(planner_us_);
   if (watch_.log != nullptr) watch_.log->write("result", log::to_json(result_));
 }

@@ -61,6 +61,7 @@ class Recorder {
     return watch_.log != nullptr && (k % watch_.every == 0 || k == 0);
   }
   /// Wall time of one call of the planner.
+  void controller_time(double seconds) noexcept { controller_us_.add(1e6 * seconds); }
   void planner_time(double seconds) noexcept { planner_us_.add(1e6 * seconds); }
   /// The line of a tick, once per node. It is written by tick_time() or close().
   void tick(long k, Json fields);
@@ -91,7 +92,7 @@ class Recorder {
   };
   log::Result& result_;
   const Watch& watch_;
-  TimeHistogram tick_us_, planner_us_;
+  TimeHistogram tick_us_, controller_us_, planner_us_;
   double started_cpu_s_ = thread_cpu_s();
   double first_balance_ = 0.0, energy_error_ = 0.0;
   Eigen::VectorXd v_last_, a_, a_last_;

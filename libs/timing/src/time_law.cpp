@@ -21,7 +21,9 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 // The share of the limits that the nodes use at first: torques rise a little between them.
 constexpr double first_share = 0.995;
-constexpr int solutions_max = 4;
+constexpr int solutions_max = 12;
+// Where q″ jumps by more than this, there are nodes so far before and behind, for timed curves [s].
+constexpr double jump_least = 1e-3, beside_jump_s = 1e-6;
 // Slopes and coefficients that count as zero, relative to a limit.
 constexpr double negligible = 1e-12;
 constexpr double squared_speed_max = 1e8;
@@ -56,7 +58,11 @@ double largest_slope(double f0, double f1, double f2, double h) {
 }  // namespace
 
 TimeLaw::TimeLaw(const model::Model& model, Limits limits, Grid grid)
-    : model_(model), limits_(std::move(limits)), grid_(grid), ws_(model) {
+    : model_(model),
+      limits_(std::move(limits)),
+      grid_(grid),
+      ws_(model),
+      squared_most_(squared_speed_max) {
   check(limits_.velocity, "velocity", model.dof(), true);
   check(limits_.acceleration, "acceleration", model.dof(), false);
   check(limits_.torque, "torque", model.dof(), true);
@@ -80,6 +86,31 @@ void TimeLaw::set_nodes(const Curve& curve) {
     const auto by_length = static_cast<Index>(std::ceil((to - from) / grid_.spacing));
     add_nodes(from, to, straight ? by_length : std::max(grid_.nodes_per_bend, by_length));
   }
+  places_ = Eigen::Map<const VectorXd>(nodes_.data(), static_cast<Index>(nodes_.size()));
+}
+
+void TimeLaw::set_nodes_beside_jumps(const Curve& curve) {
+  set_nodes(curve);
+  VectorXd q(curve.dof()), dq(q), before(q), behind(q);
+  std::vector<double> split{0.0};
+  Index piece = 0;
+  for (std::size_t i = 1; i < nodes_.size(); ++i) {
+    const double s = nodes_[i];
+    const bool is_knot = s >= curve.knot(piece + 1);
+    if (is_knot && piece + 1 < curve.pieces()) {
+      ++piece;
+      curve.at(s - beside_jump_s, q, dq, before);
+      curve.at(s + beside_jump_s, q, dq, behind);
+      if ((behind - before).lpNorm<Eigen::Infinity>() > jump_least &&
+          s - split.back() > 4.0 * beside_jump_s) {
+        split.push_back(s - beside_jump_s);
+        split.push_back(s + beside_jump_s);
+        continue;
+      }
+    }
+    split.push_back(s);
+  }
+  nodes_.swap(split);
   places_ = Eigen::Map<const VectorXd>(nodes_.data(), static_cast<Index>(nodes_.size()));
 }
 
@@ -184,7 +215,7 @@ double TimeLaw::largest(std::span<const Line> lines, double x_max) {
 // docs/theory.md (19.7): the largest squared speeds from which rest can be reached.
 bool TimeLaw::backward() {
   const Index n = places_.size();
-  squared_max_ = VectorXd::Constant(n, squared_speed_max);
+  squared_max_ = VectorXd::Constant(n, squared_most_);
   for (Index i = 0; i < n; ++i) {
     const double share = std::min(shares_[std::min(i, n - 2)], shares_[std::max<Index>(i - 1, 0)]);
     for (Index j = 0; j < limits_.velocity.size(); ++j)
@@ -193,7 +224,7 @@ bool TimeLaw::backward() {
             std::min(squared_max_[i], std::pow(share * limits_.velocity[j] / slope, 2));
   }
   controllable_.resize(n);
-  controllable_[n - 1] = 0.0;
+  controllable_[n - 1] = squared_at_end_;
   lines_.clear();
   first_line_.clear();
   for (Index i = n - 2; i >= 0; --i) {
@@ -210,7 +241,7 @@ bool TimeLaw::backward() {
 bool TimeLaw::forward(TimedPath& out, double speed) {
   const Index n = places_.size();
   constexpr double rounding = 1e-9;
-  double x = speed * speed;
+  double x = std::isfinite(speed) ? speed * speed : controllable_[0];
   if (x > controllable_[0] * (1.0 + rounding) + rounding) return false;
   out.place = places_;
   out.time_s.resize(n);
@@ -218,7 +249,7 @@ bool TimeLaw::forward(TimedPath& out, double speed) {
   out.rate.resize(n - 1);
   out.ramp = VectorXd::Zero(n - 1);
   out.time_s[0] = 0.0;
-  out.speed[0] = speed;
+  out.speed[0] = std::sqrt(x);
   for (Index i = 0; i + 1 < n; ++i) {
     const double h2 = 2.0 * (places_[i + 1] - places_[i]);
     const Range allowed = range(lines_of(i), x);
@@ -264,17 +295,34 @@ bool TimeLaw::solve(TimedPath& out, double speed) {
   return limits_.have_rates() ? solve_with_ramps(out) : solve_with_jumps(out, speed);
 }
 
+// With the time as parameter q′ is zero where the motion rests, so dσ/dt need not be.
+bool TimeLaw::slow_down(TimedPath& out) {
+  evaluated_ = 0;
+  set_nodes_beside_jumps(out.curve);
+  evaluate(out.curve, places_, true, rows_);
+  shares_ = VectorXd::Constant(places_.size() - 1, first_share);
+  squared_most_ = squared_at_end_ = 1.0;
+  const bool found = solve_with_jumps(out, infinity);
+  squared_most_ = squared_speed_max;
+  squared_at_end_ = 0.0;
+  return found;
+}
+
 bool TimeLaw::solve_with_jumps(TimedPath& out, double speed) {
   for (int i = 0; i < solutions_max; ++i) {
     if (!pass(out, speed)) return false;
     if (i == 0) evaluate_between(out);
-    double most = 0.0;
-    for (Index k = 0; k + 1 < out.nodes(); ++k) most = std::max(most, used(out, k, rows_).values);
-    if (most <= 1.0) {
+    bool within = true;
+    for (Index k = 0; k + 1 < out.nodes(); ++k) {
+      const double most = used(out, k, rows_).values;
+      if (most <= 1.0) continue;
+      within = false;
+      shares_[k] *= std::min(0.999, 0.999 / most);
+    }
+    if (within) {
       store(rows_, out);
       return true;
     }
-    shares_ *= std::min(0.999, 0.999 / most);
   }
   cause_ = "torques between the nodes of the path exceed their limits";
   return false;

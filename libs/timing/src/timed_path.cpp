@@ -47,23 +47,50 @@ TimedPath::Place TimedPath::project(const VectorXd& q_arm, const VectorXd& v_arm
   return out;
 }
 
+std::vector<double> TimedPath::sample_breaks(double beside_s) const {
+  constexpr double jump_share = 0.03;  // of the largest acceleration
+  double most = 0.0;
+  for (Index k = 0; k + 1 < nodes(); ++k) {
+    const double x = speed[k] * speed[k];
+    most = std::max(most, (rate[k] * tangent.col(k) + x * curvature.col(k)).cwiseAbs().maxCoeff());
+  }
+  std::vector<double> out{0.0};
+  for (Index k = 1; k + 1 < nodes(); ++k) {
+    const double jump =
+        std::abs(rate[k] - rate_at_end(k - 1)) * tangent.col(k).cwiseAbs().maxCoeff();
+    const double before = time_s[k] - beside_s, behind = time_s[k] + beside_s;
+    if (jump < jump_share * most || before <= out.back() || behind >= duration_s()) continue;
+    out.push_back(before);
+    out.push_back(behind);
+  }
+  out.push_back(duration_s());
+  return out;
+}
+
 scene::JointTrajectory TimedPath::sampled(double spacing_s) const {
-  const double T = duration_s();
-  const auto n = std::max<Index>(2, static_cast<Index>(std::ceil(T / spacing_s)));
+  constexpr double beside_s = 2.5e-4;
+  const std::vector<double> breaks = sample_breaks(std::min(beside_s, 0.25 * spacing_s));
+  std::vector<double> times{0.0};
+  for (std::size_t i = 1; i < breaks.size(); ++i) {
+    const double from = breaks[i - 1], length = breaks[i] - from,
+                 count = std::max(1.0, std::ceil(length / spacing_s));
+    for (double k = 1.0; k < count; ++k) times.push_back(from + length * k / count);
+    times.push_back(breaks[i]);
+  }
+  const auto n = static_cast<Index>(times.size());
   scene::JointTrajectory out;
-  out.time_s.resize(n + 1);
-  out.q.resize(curve.dof(), n + 1);
+  out.time_s = VectorXd::Map(times.data(), n);
+  out.q.resize(curve.dof(), n);
   out.v = out.a = out.q;
   VectorXd q(curve.dof()), v(curve.dof()), a(curve.dof());
   Cursor cursor;
-  for (Index k = 0; k <= n; ++k) {
-    out.time_s[k] = T * static_cast<double>(k) / static_cast<double>(n);
+  for (Index k = 0; k < n; ++k) {
     at(out.time_s[k], q, v, a, cursor);
     out.q.col(k) = q;
     out.v.col(k) = v;
     out.a.col(k) = a;
   }
-  out.v.col(n).setZero();
+  out.v.col(n - 1).setZero();
   return out;
 }
 

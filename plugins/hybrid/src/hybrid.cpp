@@ -49,7 +49,8 @@ double track_rate_within(double horizon_s) {
 class Hybrid final : public planning::Planner {
  public:
   static constexpr std::uint32_t properties = HAMELIN_FOLLOWS_TARGETS | HAMELIN_FOLLOWS_PATHS |
-                                              HAMELIN_FOLLOWS_TRAJECTORIES | HAMELIN_ASKS_FOR_PATHS;
+                                              HAMELIN_FOLLOWS_TRAJECTORIES | HAMELIN_ASKS_FOR_PATHS |
+                                              HAMELIN_TRUSTS_CERTIFIED_PATHS;
 
   Hybrid(const planning::Host& host, const planning::Setup& setup, const Json& params)
       : host_(host),

@@ -44,17 +44,28 @@ void PathCertifier::certify(CertifiedPath& path, const search::Margins& margins,
   const Index n = path.motion.nodes() - 1;
   path.clearance_m.resize(n);
   path.self_m.resize(n);
-  path.room.resize(q_lower_.size(), q_lower_.size() > 0 ? n : 0);
   for (Index k = 0; k < n; ++k) {
     path.motion.chord(k, chord_.from, chord_.to, chord_.stray);
     set_margins(path, k, margins, query);
-    if (path.room.size() > 0)
-      path.room.col(k) = (chord_.from.cwiseMin(chord_.to) - q_lower_)
-                             .cwiseMin(q_upper_ - chord_.from.cwiseMax(chord_.to)) -
-                         chord_.stray;
   }
+  complete(path);
+}
+
+void PathCertifier::complete(CertifiedPath& path) {
+  set_room(path);
   set_mass(path);
   set_braking(path);
+}
+
+void PathCertifier::set_room(CertifiedPath& path) {
+  if (q_lower_.size() == 0) return;
+  path.room.resize(q_lower_.size(), path.motion.nodes() - 1);
+  for (Index k = 0; k < path.room.cols(); ++k) {
+    path.motion.chord(k, chord_.from, chord_.to, chord_.stray);
+    path.room.col(k) = (chord_.from.cwiseMin(chord_.to) - q_lower_)
+                           .cwiseMin(q_upper_ - chord_.from.cwiseMax(chord_.to)) -
+                       chord_.stray;
+  }
 }
 
 // docs/theory.md (14.30). Near a tight start or goal paths are proved with less than there is.

@@ -22,6 +22,8 @@ class PathCertifier {
   /// @param margins that its lines and blends are proved to keep
   /// @param query its margins are changed
   void certify(CertifiedPath& path, const search::Margins& margins, search::Query& query);
+  /// The same where the margins are set already.
+  void complete(CertifiedPath& path);
 
  private:
   /// From one node to the next.
@@ -32,6 +34,7 @@ class PathCertifier {
                    search::Query& query);
   [[nodiscard]] bool keeps(double of_obstacles_m, double of_self_m, search::Query& query) const;
   void raise_margins(double& clearance_m, double& self_m, search::Query& query) const;
+  void set_room(CertifiedPath& path);
   void set_mass(CertifiedPath& path);
   /// How stops may brake where rates are bounded.
   void set_braking(CertifiedPath& path) const;

@@ -5,13 +5,12 @@
 #include <string_view>
 
 #include "guide/guide_query.hpp"
+#include "guide/motion_limits.hpp"
 #include "guide/path_certifier.hpp"
-#include "hamelin/control/planner_setup.hpp"
 #include "hamelin/scene/levers.hpp"
 #include "hamelin/timing/blended_path.hpp"
 #include "hamelin/timing/time_law.hpp"
 #include "hamelin/timing/way_points.hpp"
-#include "loop/stop_finder.hpp"
 #include "shield/certified_path.hpp"
 
 namespace hamelin::control {
@@ -19,17 +18,10 @@ namespace hamelin::control {
 /// Makes timed motions of paths that a search has found, and says what is proved of them.
 class PathTiming {
  public:
-  /// What bounds motions, which keep within what planner and shield leave to them, so that neither
-  /// has to change them.
-  struct Bounds {
-    LimitReserve reserve;  ///< what a shield keeps
-    Json params;           ///< of the planner, for path_acceleration
-    ChangeBounds changes;  ///< of the drives
-  };
   /// @param model kept by reference @param self null if self-collision is not modelled
   /// @param settings of the search, for the joint limits that way-points keep
   PathTiming(const scene::Scene& scene, const model::Model& model, const scene::SelfField* self,
-             const Bounds& bounds, const search::Settings& settings);
+             const MotionBounds& bounds, const search::Settings& settings);
 
   /// Begins with the paths to a goal. @param number of the search, for random numbers
   void begin(std::uint64_t number);

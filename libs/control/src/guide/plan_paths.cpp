@@ -163,8 +163,8 @@ PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& w
   std::unique_ptr<PathTiming> timing;
   if (options.motions)
     timing = std::make_unique<PathTiming>(
-        scene, arm, view.self_field(),
-        PathTiming::Bounds{reserve, params, changes_of(scene, arm.dof())}, settings);
+        scene, arm, view.self_field(), MotionBounds{reserve, params, changes_of(scene, arm.dof())},
+        settings);
   MotionSearch search(arm, settings, std::move(timing), MotionSearch::other_checks(scene.guide));
   PathPlan plan;
   plan.scene = scene.name;

@@ -67,7 +67,7 @@ void Controller::look(bool first) {
     if (arm_->view.take_newest()) arm_->view.look(this->q(), time_s_);
   } else {
     (void)arm_->view.take_newest();
-    arm_->view.look(this->q(), time_s_);
+    see();
   }
   take_load();
   take_stop();
@@ -78,7 +78,7 @@ void Controller::look(bool first) {
   answer_.state = ControlState::running;
   answer_.cause = {};
   update_reference();
-  while (!reference_.on_the_way() && goals_.advance(arm_->view.poses(), this->q(), this->v()))
+  while (!on_the_way() && goals_.advance(arm_->view.poses(), this->q(), this->v()))
     update_reference();
   answer_.goal_index = goals_.index();
   update_target();
@@ -91,6 +91,14 @@ void Controller::look(bool first) {
     else
       answer_.state = ControlState::stalled;
   }
+}
+
+// What a planner that trusts its path does not ask for, and nobody else needs, is not searched.
+void Controller::see() {
+  if (on_path_ && !options_.certify && plugin().trusts_certified_paths())
+    arm_->view.glance(q(), time_s_);
+  else
+    arm_->view.look(q(), time_s_);
 }
 
 void Controller::measure(double time_s, const VectorXd& q, const VectorXd& v) {
@@ -182,6 +190,7 @@ void Controller::ask_planner() {
   listed_ = listed;
   if (guidance_) update_guidance();
   update_path();
+  see();
   goal_ = {goal_for_planner(), goal_.number, index};
   reset_ = false;
   const double since_s = options_.clock_s != nullptr ? options_.clock_s() : 0.0;

@@ -147,7 +147,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       newest_goals_(scene_.goals),
       newest_arm_(arm_.get()),
       measured_(static_cast<std::size_t>(nominal_.dof())),
-      mail_(std::make_unique<Mailbox>(scene_.goals)),
+      mail_(std::make_unique<Mailbox>(scene_.goals, arm_->certify(scene_.goals, arm_setup()))),
       goal_list_(&mail_->goals.take()),
       reference_(nominal_.dof()),
       path_reference_(std::make_unique<PathReference>(nominal_.dof())),
@@ -196,6 +196,7 @@ void Controller::reset() {
   target_.stop();
   reference_.stop();
   path_reference_->stop();
+  forsaken_ = nullptr;
   make_guidance();
   scene::Scene scene = scene_;
   scene.goals = newest_goals_;

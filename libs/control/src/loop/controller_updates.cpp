@@ -44,10 +44,13 @@ void check_size(std::span<const scene::Payload> payloads, const model::Model& lo
 
 std::uint64_t Controller::set_goals(std::vector<scene::Goal> goals) {
   check_goals(goals, scene_, nominal_, path_points_max_, plugin());
+  const std::lock_guard load_lock(load_mutex_);
+  GoalList::Motions motions = newest_arm_->certify(goals, arm_setup());
   const std::lock_guard lock(goals_mutex_);
   newest_goals_ = goals;
   expect_target(goals);
-  mail_->goals.publish(std::make_unique<GoalList>(++goals_number_, std::move(goals)));
+  mail_->goals.publish(std::make_unique<GoalList>(++goals_number_, std::move(goals),
+                                                  std::move(motions), load_number_));
   return goals_number_;
 }
 
@@ -290,6 +293,8 @@ void Controller::take_goals() {
   listed_ = nullptr;
   target_.stop();
   reference_.stop();
+  path_reference_->stop();
+  forsaken_ = nullptr;
 }
 
 // A target starts where the tip is when its goal becomes the current one.
@@ -305,11 +310,24 @@ void Controller::update_target() {
 void Controller::update_reference() {
   const scene::Goal& goal = goals_.goal();
   answer_.reference = nullptr;
-  if (!goal.trajectory) return reference_.stop();
+  if (!goal.trajectory || proved_trajectory() != nullptr) return reference_.stop();
   if (reference_.goal() != &goal) reference_.start(goal);
   answer_.reference = &reference_.update(period_s_, q(), v());
   // an arm that waits where its reference does has not stalled
   if (reference_.on_the_way() && answer_.reference->rate > 0.0) goals_.forget_rest();
+}
+
+const CertifiedPath* Controller::proved_trajectory() const noexcept {
+  if (goal_list_->load != answer_.load) return nullptr;
+  const CertifiedPath* const path =
+      goal_list_->motions[std::min(goals_.index(), goals_.size() - 1)].get();
+  return path != forsaken_ ? path : nullptr;
+}
+
+bool Controller::on_the_way() const noexcept {
+  const CertifiedPath* const path = proved_trajectory();
+  if (path == nullptr) return reference_.on_the_way();
+  return path != path_reference_->path() || !path_reference_->state().ended;
 }
 
 const hamelin_goal* Controller::goal_for_planner() {
@@ -351,18 +369,22 @@ const CertifiedPath* Controller::path_in_force() const noexcept {
   return motion.along_path() ? motion.path_stop().path() : nullptr;
 }
 
-// The motion along the path that a search has found.
+// The motion along the path that a search has found, or that a goal has.
 void Controller::update_path() {
-  const CertifiedPath* const path = guidance_ ? guidance_->motion() : nullptr;
+  const CertifiedPath* path = proved_trajectory();
+  const bool is_given = path != nullptr;
+  if (!is_given && guidance_) path = guidance_->motion();
   Shield* const shield = arm_->shield.get();
   if (path != path_reference_->path())
     path != nullptr ? path_reference_->start(*path) : path_reference_->stop();
   if (shield != nullptr && shield->path_proof().path() != path)
     shield->set_path(path, surroundings());
+  on_path_ = false;
   if (path == nullptr) return;
   const ReferenceState& state =
       path_reference_->update({period_s_, q(), v(), answer_.stopping, arm_->view.speed_scale()});
   answer_.reference = &state;
+  on_path_ = state.error < HAMELIN_ON_PATH;
   if (shield != nullptr)
     shield->note_path(
         path_reference_->next(static_cast<double>(drive_options_->delay_periods) * period_s_));
@@ -372,7 +394,10 @@ void Controller::update_path() {
   held_s_ = held ? held_s_ + period_s_ : 0.0;
   if (held_s_ < longest_held_s) return;
   held_s_ = 0.0;
-  if (!guidance_->request()) guidance_->give_up_path();
+  if (is_given)
+    forsaken_ = path;
+  else if (!guidance_->request())
+    guidance_->give_up_path();
 }
 
 void Controller::take_params() {

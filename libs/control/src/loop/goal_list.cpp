@@ -79,8 +79,9 @@ void check_tip_goal(const scene::Goal& goal, std::size_t i) {
 
 }  // namespace
 
-GoalList::GoalList(std::uint64_t of_number, std::vector<scene::Goal> all)
-    : number(of_number), goals(std::move(all)) {
+GoalList::GoalList(std::uint64_t of_number, std::vector<scene::Goal> all, Motions of_goals,
+                   std::uint64_t of_load)
+    : number(of_number), goals(std::move(all)), motions(std::move(of_goals)), load(of_load) {
   for (const auto& goal : goals) for_planner.push_back(to_c(goal));
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -9,18 +10,24 @@
 #include "hamelin/model/model.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 #include "hamelin/scene/scene.hpp"
+#include "shield/certified_path.hpp"
 
 namespace hamelin::control {
 
 /// A list of goals as the control loop and as its planner see it. Immutable once published.
 struct GoalList {
-  /// @param goals at least one
-  GoalList(std::uint64_t number, std::vector<scene::Goal> goals);
+  /// Of each goal what its trajectory is proved as; null: it has none, or there is no proof.
+  using Motions = std::vector<std::unique_ptr<const CertifiedPath>>;
+  /// @param goals at least one @param motions one per goal @param load for which they are proved
+  GoalList(std::uint64_t number, std::vector<scene::Goal> goals, Motions motions,
+           std::uint64_t load);
   GoalList(const GoalList&) = delete;
   GoalList& operator=(const GoalList&) = delete;
 
   std::uint64_t number;  ///< 0 for the goals of the scene; counts the lists that replaced them
   std::vector<scene::Goal> goals;
+  Motions motions;
+  std::uint64_t load;                     ///< Answer::load for which the motions are proved
   std::vector<hamelin_goal> for_planner;  ///< the same; pointers refer to `goals`
 };
 

@@ -1,5 +1,7 @@
 #include "loop/loaded_arm.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -21,6 +23,27 @@ LoadedArm::LoadedArm(const scene::Scene& scene, model::Model nominal, const Json
   of_drive.gyroscopic_terms_max = view.contacts_max();
   drive = make_drive(scene, model, of_drive, shield ? shield->limit_reserve() : LimitReserve{});
   if (!shield) make_stop(scene, arm);
+  if (arm.plugin.follows_trajectories())
+    trajectories_ = std::make_unique<TrajectoryCertifier>(
+        scene, model, view.self_field(),
+        MotionBounds{shield ? shield->limit_reserve() : LimitReserve{}, params,
+                     arm.drive.changes(scene)});
+}
+
+std::vector<std::unique_ptr<const CertifiedPath>> LoadedArm::certify(
+    const std::vector<scene::Goal>& goals, const ArmSetup& arm) const {
+  std::vector<std::unique_ptr<const CertifiedPath>> out(goals.size());
+  for (std::size_t i = 0; i < goals.size(); ++i) {
+    if (!goals[i].trajectory || !trajectories_) continue;
+    auto result = trajectories_->certify(*goals[i].trajectory, *arm.world.latest());
+    const bool proved = result.motion != nullptr;
+    out[i] = std::move(result.motion);
+    if (!arm.log || result.cause.empty()) continue;
+    arm.log(HAMELIN_LOG_INFO,
+            fmt::format("goal {}: the trajectory is {}: {}", i + 1,
+                        proved ? "followed more slowly" : "not proved", result.cause));
+  }
+  return out;
 }
 
 void LoadedArm::make_stop(const scene::Scene& scene, const ArmSetup& arm) {
@@ -59,9 +82,9 @@ std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, co
   const search::Settings settings = guide_settings(scene, model, view, reserve, params);
   std::unique_ptr<PathTiming> timing;
   if (arm.plugin.follows_trajectories())
-    timing = std::make_unique<PathTiming>(
-        scene, model, view.self_field(),
-        PathTiming::Bounds{reserve, params, arm.drive.changes(scene)}, settings);
+    timing = std::make_unique<PathTiming>(scene, model, view.self_field(),
+                                          MotionBounds{reserve, params, arm.drive.changes(scene)},
+                                          settings);
   return std::make_unique<GuideSearch>(
       model, arm.world, view,
       std::make_unique<MotionSearch>(model, settings, std::move(timing),

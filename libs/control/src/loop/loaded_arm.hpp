@@ -6,6 +6,7 @@
 #include <span>
 
 #include "guide/guide_search.hpp"
+#include "guide/trajectory_certifier.hpp"
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/world.hpp"
 #include "hamelin/control/world_view.hpp"
@@ -58,6 +59,11 @@ struct LoadedArm {
   std::unique_ptr<Drive> drive;
   std::unique_ptr<GuideSearch> guide;  ///< null if the scene asks for none
 
+  /// Proves the trajectories of goals in the newest world. For writers, one at a time.
+  /// @return for each goal its motion; null without a trajectory or a proof
+  [[nodiscard]] std::vector<std::unique_ptr<const CertifiedPath>> certify(
+      const std::vector<scene::Goal>& goals, const ArmSetup& arm) const;
+
   /// The stop that acts where no answer does.
   [[nodiscard]] Stop& stop() noexcept { return shield ? shield->stop() : *unverified_stop_; }
 
@@ -69,7 +75,8 @@ struct LoadedArm {
   [[nodiscard]] std::unique_ptr<GuideSearch> make_guide(const scene::Scene& scene,
                                                         const Json& params, const ArmSetup& arm);
 
-  std::optional<StopFinder> finder_;  ///< without a shield, as the next
+  std::unique_ptr<TrajectoryCertifier> trajectories_;  ///< null if the planner follows none
+  std::optional<StopFinder> finder_;                   ///< without a shield, as the next
   std::optional<Stop> unverified_stop_;
   Eigen::VectorXd start_q_;  ///< for which it was made
 };

@@ -2,6 +2,8 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "hamelin/control/line_buffer.hpp"
 #include "hamelin/control/live_target.hpp"
@@ -36,8 +38,8 @@ struct StopRequest {
 /// What other threads have sent to the tick, which takes the newest of each without waiting. The
 /// world has a place of its own, World.
 struct Mailbox {
-  explicit Mailbox(const std::vector<scene::Goal>& first_goals)
-      : goals(std::make_unique<GoalList>(0, first_goals)),
+  Mailbox(const std::vector<scene::Goal>& first_goals, GoalList::Motions motions)
+      : goals(std::make_unique<GoalList>(0, first_goals, std::move(motions), 0)),
         params(std::make_unique<NewParams>()),
         load(std::make_unique<NewLoad>()),
         stop(std::make_unique<StopRequest>()),

@@ -124,20 +124,48 @@ void WorldView::change_map(const scene::MapChangeSpec& change) {
 }
 
 void WorldView::look(const Eigen::VectorXd& q, double time_s) {
-  if (current_ && time_s == time_s_ && q == q_) return;
+  if (!place_arm(q, time_s) && has_contacts_) return;
+  has_contacts_ = true;
+  clearance_now_ = influence_;
+  if (has_obstacles()) update_obstacle_contacts();
+  if (has_self()) update_self_contacts();
+}
+
+void WorldView::glance(const Eigen::VectorXd& q, double time_s) {
+  if (hidden_obstacles_ || slow_in_unknown_ || environment_->has_movers())
+    look(q, time_s);
+  else if (place_arm(q, time_s))
+    measure_clearances();
+}
+
+bool WorldView::place_arm(const Eigen::VectorXd& q, double time_s) {
+  if (current_ && time_s == time_s_ && q == q_) return false;
   current_ = true;
+  has_contacts_ = false;
   q_ = q;
   time_s_ = time_s;
   dynamics::forward_kinematics(model_, poses_, q);
-  clearance_now_ = influence_;
-  self_clearance_now_ = self_influence_;
   nearest_.sphere = -1;
-  contact_count_ = 0;
+  contact_count_ = self_contact_count_ = 0;
   speed_scale_ = 1.0;
   revealed_.clear();
   if (has_obstacles() || has_self()) arm_.place(model_, poses_);
-  if (has_obstacles()) update_obstacle_contacts();
-  if (has_self()) update_self_contacts();
+  return true;
+}
+
+// The last clearance bounds the search: an arm moves little from tick to tick.
+void WorldView::measure_clearances() {
+  constexpr double moved_m = 0.02;
+  if (has_self()) {
+    update_self_contacts();
+    self_contact_count_ = 0;
+  }
+  const double near = std::min(clearance_now_ + moved_m, influence_);
+  const auto within = [this](double limit) {
+    return has_obstacles() ? environment_->clearance(arm_.view(), time_s_, limit) : limit;
+  };
+  clearance_now_ = within(near);
+  if (clearance_now_ == near && near < influence_) clearance_now_ = within(influence_);
 }
 
 void WorldView::update_obstacle_contacts() {
@@ -175,6 +203,7 @@ void WorldView::update_clearances(std::span<const scene::Contact> contacts) {
 }
 
 void WorldView::update_self_contacts() {
+  self_clearance_now_ = self_influence_;
   self_contact_count_ = self_->closest(arm_.view(), self_influence_, self_contacts_);
   std::fill(self_clearance_.begin(), self_clearance_.end(), self_influence_);
   for (const auto& contact : self_contacts()) {

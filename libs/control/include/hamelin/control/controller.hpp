@@ -279,6 +279,7 @@ class Controller {
   void measure(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   /// The rest of observe(), once the measurement is taken or missing.
   void look(bool first);
+  void see();
   /// Notes why the measurement cannot be used. @throws Error invalid at the first tick
   void lose_measurement(double time_s, bool in_order);
   /// Stops an arm that cannot be seen, or does not do what it is sent.
@@ -296,8 +297,12 @@ class Controller {
   void take_params();
   /// Lets the guide choose what the planner is shown.
   void update_guidance();
-  /// Moves on along the path that the guide has found, if there is one.
+  /// Moves on along the path that the guide has found or the goal has, if there is one.
   void update_path();
+  /// That of the current goal; null if it has none, or the arm could not stay on it.
+  [[nodiscard]] const CertifiedPath* proved_trajectory() const noexcept;
+  /// Whether the arm is on the trajectory of its goal, and not at its end.
+  [[nodiscard]] bool on_the_way() const noexcept;
   /// The path along which the stop in force goes; else null.
   [[nodiscard]] const CertifiedPath* path_in_force() const noexcept;
   /// Calls the planner; stops the arm if it fails or was late too often.
@@ -347,7 +352,9 @@ class Controller {
   LiveTarget target_;
   LiveReference reference_;
   std::unique_ptr<PathReference> path_reference_;
-  double held_s_ = 0.0;  ///< for which the arm was not allowed to leave its place on the path
+  const CertifiedPath* forsaken_ = nullptr;  ///< a trajectory on which the arm could not stay
+  bool on_path_ = false;  ///< whether the arm was near the reference of a certified path
+  double held_s_ = 0.0;   ///< for which the arm was not allowed to leave its place on the path
   const hamelin_goal* listed_ = nullptr;  ///< the goal of the last tick in its list
   hamelin_goal live_goal_{};              ///< the current one if it changes from tick to tick
   std::uint64_t used_params_ = 0;

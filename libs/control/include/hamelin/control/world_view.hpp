@@ -61,6 +61,9 @@ class WorldView {
   /// Updates contacts(), self_contacts(), clearances and poses() to the configuration q. Costs
   /// nothing if the last look was at the same configuration, time and snapshot.
   void look(const Eigen::VectorXd& q, double time_s);
+  /// The same without contacts, that is poses() and clearances, where all obstacles stand still and
+  /// are known; a look() after it completes it.
+  void glance(const Eigen::VectorXd& q, double time_s);
   /// Makes the configuration of the last look() the start of the motion for certify().
   void depart(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   /// Whether the motion from the configuration of depart() to that of the last look() was clear,
@@ -160,6 +163,9 @@ class WorldView {
   WorldView(const scene::Scene& scene, const model::Model& model, double influence_m,
             std::optional<Own> own, World* world, std::size_t contacts_max);
   void see(World::View& view);
+  /// @return whether the arm was elsewhere
+  bool place_arm(const Eigen::VectorXd& q, double time_s);
+  void measure_clearances();
   void update_obstacle_contacts();
   void update_self_contacts();
   void reveal_visible();
@@ -183,7 +189,8 @@ class WorldView {
   std::vector<int> revealed_;
 
   // at the configuration of the last look()
-  bool current_ = false;  ///< whether the following belongs to q_, time_s_ and environment_
+  /// Whether the following belongs to q_, time_s_ and environment_, without contacts or with them.
+  bool current_ = false, has_contacts_ = false;
   Eigen::VectorXd q_;
   dynamics::Workspace poses_;
   double time_s_ = 0.0;

@@ -171,10 +171,11 @@ struct Result {
   struct TickTime {
     double p50 = 0.0, p99 = 0.0, max = 0.0;  ///< [µs]
   };
-  std::optional<TickTime> tick_us;     ///< thread CPU time
-  std::optional<TickTime> planner_us;  ///< wall time of the planner alone
-  std::optional<double> deadline_us;   ///< wall time that a planner should not exceed
-  std::uint64_t late_ticks = 0;        ///< how often it did
+  std::optional<TickTime> tick_us;        ///< thread CPU time
+  std::optional<TickTime> controller_us;  ///< wall time of the controller, without the guide
+  std::optional<TickTime> planner_us;     ///< wall time of the planner alone
+  std::optional<double> deadline_us;      ///< wall time that a planner should not exceed
+  std::uint64_t late_ticks = 0;           ///< how often it did
   Json provenance = Json::object();
 };
 

@@ -402,6 +402,9 @@ typedef struct hamelin_host {
   int32_t (*request_path)(void* context);
 } hamelin_host;
 
+/* An arm is on its reference if no joint is farther from it than this [rad or m]. */
+#define HAMELIN_ON_PATH 0.1
+
 /* hamelin_plugin.properties: what a planner does not promise, and what it can do besides. */
 enum {
   HAMELIN_TICK_ALLOCATES = 1,  /* its tick may use the heap, and so may wait for other threads */
@@ -411,7 +414,10 @@ enum {
    * the way-points as joint goals, one after the other. */
   HAMELIN_FOLLOWS_PATHS = 8,
   HAMELIN_FOLLOWS_TRAJECTORIES = 16, /* it accepts joint goals with a trajectory */
-  HAMELIN_ASKS_FOR_PATHS = 32        /* it calls hamelin_host.request_path, if it needs paths */
+  HAMELIN_ASKS_FOR_PATHS = 32,       /* it calls hamelin_host.request_path, if it needs paths */
+  /* Near points are no matter to it while it follows a certified reference: where nothing moves and
+   * the arm was within HAMELIN_ON_PATH of it, ticks list none. Functions that find them still do. */
+  HAMELIN_TRUSTS_CERTIFIED_PATHS = 64
 };
 
 /* All functions never throw. They are called on one thread, that of tick, unless stated otherwise;

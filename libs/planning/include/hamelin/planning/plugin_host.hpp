@@ -235,6 +235,8 @@ class Plugin {
   [[nodiscard]] bool follows_paths() const noexcept;
   /// Whether it may ask for paths.
   [[nodiscard]] bool asks_for_paths() const noexcept;
+  /// Whether it needs no near points while it follows a certified reference.
+  [[nodiscard]] bool trusts_certified_paths() const noexcept;
   /// Whether it accepts joint goals with a trajectory.
   [[nodiscard]] bool follows_trajectories() const noexcept;
   /// Whether its planners' parameters can be changed while they run, and whether they can be told

@@ -46,6 +46,10 @@ class TimeLaw {
   /// @param speed dσ/dt at the beginning; zero where rates are bounded
   /// @return whether there is a motion; else see cause()
   [[nodiscard]] bool solve(TimedPath& out, double speed = 0.0);
+  /// The motion of a curve whose parameter is the time, from rest to rest, slower than it was meant
+  /// where the limits ask for that: docs/theory.md (19.15). Rates must not be bounded.
+  /// @param out, @return as in solve()
+  [[nodiscard]] bool slow_down(TimedPath& out);
   /// The duration of the motion from rest if rates are not bounded, and without an examination
   /// between the nodes; infinite if there is none.
   [[nodiscard]] double duration_s(const Curve& curve);
@@ -68,6 +72,8 @@ class TimeLaw {
     dynamics::StatesXd tangent, curvature, inertia, bias, gravity;
   };
   void set_nodes(const Curve& curve);
+  /// The same for one whose q″ may jump.
+  void set_nodes_beside_jumps(const Curve& curve);
   void add_nodes(double from, double to, Eigen::Index count);
   /// @param torques whether A, B and g are needed
   void evaluate(const Curve& curve, const Eigen::VectorXd& places, bool torques, Rows& out);
@@ -115,6 +121,8 @@ class TimeLaw {
   TimedPath trial_;                      ///< without a curve
   TimedPath other_;                      ///< an averaged motion beside the best
   double acceleration_share_ = 1.0;
+  /// (dσ/dt)² at most, and at the end.
+  double squared_most_, squared_at_end_ = 0.0;
 };
 
 }  // namespace hamelin::timing

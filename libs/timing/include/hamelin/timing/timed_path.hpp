@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <vector>
 
 #include "hamelin/scene/joint_trajectory.hpp"
 #include "hamelin/timing/curve.hpp"
@@ -53,8 +54,13 @@ struct TimedPath {
   [[nodiscard]] Place project(const Eigen::VectorXd& q_arm, const Eigen::VectorXd& v_arm,
                               const Place& near, Cursor& cursor, Eigen::VectorXd& q,
                               Eigen::VectorXd& v, Eigen::VectorXd& a) const;
-  /// The motion at times that are at most `spacing_s` apart.
+  /// The motion at times that are at most `spacing_s` apart, with points before and behind each
+  /// place where the acceleration jumps, between which it changes as fast.
   [[nodiscard]] scene::JointTrajectory sampled(double spacing_s) const;
+
+ private:
+  /// The times between which sampled() may space its points evenly.
+  [[nodiscard]] std::vector<double> sample_breaks(double beside_s) const;
 };
 
 }  // namespace hamelin::timing
