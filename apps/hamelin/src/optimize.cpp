@@ -134,12 +134,13 @@ void add_optimize(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(0.0, 0.1))
       ->capture_default_str();
   command
-      ->add_option("--limit-share", motion.limit_share,
-                   "share of the limits of velocity and torque that the motion may use; below 1, "
-                   "the rest is for the feedback of an arm that follows it")
+      ->add_option(
+          "--limit-share", motion.limit_share,
+          "share of the limits of velocity and torque that the motion may use; the rest is "
+          "for the feedback of an arm that follows it (default 1 of velocities, 0.9 of "
+          "torques)")
       ->type_name("S")
-      ->check(CLI::Range(0.01, 1.0))
-      ->capture_default_str();
+      ->check(CLI::Range(0.01, 1.0));
   command
       ->add_option("--acceleration", motion.acceleration,
                    "limit of all joints [rad/s^2 or m/s^2] (default: none)")

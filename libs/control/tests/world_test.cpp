@@ -284,6 +284,31 @@ TEST_CASE("a map that is changed in parts gives the distances of the whole chang
   CHECK(changed > 20);
 }
 
+TEST_CASE("a glance finds the clearances of a look, and a look after it the contacts",
+          "[control][world]") {
+  const model::Model arm(test::planar4());
+  control::World world(empty_scene(), arm, {0.5, 8});
+  (void)world.set_obstacle(ball("a", {1.0, 0.6, 0.0}));
+  (void)world.set_obstacle(ball("b", {0.5, -0.7, 0.0}));
+  control::WorldView looks(empty_scene(), arm, world), glances(empty_scene(), arm, world);
+  std::mt19937 rng(4);
+  std::uniform_real_distribution<double> angle(-1.0, 1.0);
+  int near = 0;
+  for (int k = 0; k < 200; ++k) {
+    Eigen::VectorXd q(4);
+    for (double& x : q) x = angle(rng);
+    looks.look(q, 0.0);
+    glances.glance(q, 0.0);
+    CHECK(glances.clearance_m() == looks.clearance_m());
+    CHECK(glances.contacts().empty());
+    near += looks.clearance_m() < 0.5 ? 1 : 0;
+    glances.look(q, 0.0);
+    CHECK(glances.contacts().size() == looks.contacts().size());
+    CHECK(glances.clearance_m() == looks.clearance_m());
+  }
+  CHECK(near > 50);
+}
+
 TEST_CASE("a control loop sees whole snapshots while two threads update them, without allocating",
           "[control][world]") {
   const model::Model arm(test::planar4());

@@ -18,6 +18,11 @@ using Eigen::Index;
 
 namespace {
 
+constexpr double usual_torque_share = 0.9;
+// Motions keep so far away from joint limits where their ends do [rad or m]: beyond the limits
+// there is no place for what feedback corrects.
+constexpr double limit_distance = 0.01;
+
 [[noreturn]] void refuse_scene(const scene::Scene& scene, const std::string& what) {
   throw Error(ErrorCode::invalid, scene.name + ": " + what);
 }
@@ -29,9 +34,9 @@ void check_positive(const char* what, double x) {
 
 // Of what a Problem does not check itself, or only after the map is read.
 void check_options(const SceneMotionOptions& options) {
-  check_positive("share of the limits", options.limit_share);
-  if (options.limit_share > 1.0)
-    refuse(fmt::format("share of the limits: {} given, expected at most 1", options.limit_share));
+  const double share = options.limit_share.value_or(1.0);
+  check_positive("share of the limits", share);
+  if (share > 1.0) refuse(fmt::format("share of the limits: {} given, expected at most 1", share));
   if (!(options.margin_m >= 0.0) || !std::isfinite(options.margin_m))
     refuse(fmt::format("margin: {} given, expected a finite number that is not negative",
                        options.margin_m));
@@ -99,8 +104,8 @@ Problem problem_of(const scene::Scene& scene, const SceneMotionOptions& options,
   const control::ModelledLimits limits = control::modelled_limits(scene, model.robot());
   problem.limits.position_min = limits.q_lower;
   problem.limits.position_max = limits.q_upper;
-  problem.limits.velocity = options.limit_share * limits.velocity_max;
-  problem.limits.torque = options.limit_share * limits.effort_max;
+  problem.limits.velocity = options.limit_share.value_or(1.0) * limits.velocity_max;
+  problem.limits.torque = options.limit_share.value_or(usual_torque_share) * limits.effort_max;
   const Index n = model.dof();
   if (options.acceleration)
     problem.limits.acceleration = VectorXd::Constant(n, *options.acceleration);
@@ -122,6 +127,22 @@ std::vector<MatrixXd> guide_paths(const scene::Scene& scene, const model::Model&
   return paths;
 }
 
+// `q_lower`, `q_upper` of the joints.
+void keep_off_limits(const VectorXd& q_lower, const VectorXd& q_upper, Problem& problem) {
+  if (q_lower.size() == 0) return;
+  const auto from = [&](const VectorXd& limit, double distance) -> VectorXd {
+    return (limit.array() + distance).matrix();
+  };
+  problem.limits.position_min = from(q_lower, limit_distance)
+                                    .cwiseMin(problem.q_start)
+                                    .cwiseMin(problem.q_goal)
+                                    .cwiseMax(q_lower);
+  problem.limits.position_max = from(q_upper, -limit_distance)
+                                    .cwiseMax(problem.q_start)
+                                    .cwiseMax(problem.q_goal)
+                                    .cwiseMin(q_upper);
+}
+
 // `paths`: for each goal way-points from the configuration before it, or empty: along the goals'
 // own paths, or straight.
 SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& options,
@@ -134,6 +155,7 @@ SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& 
   VectorXd q = scene.start_q.size() > 0 ? scene.start_q : rest,
            v = scene.start_v.size() > 0 ? scene.start_v : rest;
   Problem problem = problem_of(scene, options, model);
+  const VectorXd q_lower = problem.limits.position_min, q_upper = problem.limits.position_max;
   problem.v_goal = rest;
   for (std::size_t i = 0; i < scene.goals.size(); ++i) {
     const MatrixXd points = way_points(scene.goals[i], q, i < paths.size() ? &paths[i] : nullptr);
@@ -141,6 +163,7 @@ SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& 
     problem.v_start = v;
     problem.begin_s = out.duration_s();
     problem.q_goal = points.rightCols<1>();
+    keep_off_limits(q_lower, q_upper, problem);
     problem.duration_s =
         options.duration_s.value_or(slow_duration(points, problem.limits.velocity));
     try {

@@ -225,6 +225,7 @@ TEST_CASE("torques between the knots keep their limits, whatever the number of k
   options.objective = Objective::time;
   options.intervals = GENERATE(6, 12);
   options.duration_s = 1.0;
+  options.limit_share = 1.0;
   const SceneMotion motion = optimize_scene(scene, options);
   const Optimized& found = motion.goals.at(0).found;
   CAPTURE(options.intervals, found.torque_share, found.solution.violated);

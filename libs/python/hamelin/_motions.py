@@ -196,7 +196,7 @@ def optimize(
     duration: float | None = None,
     intervals: int = 50,
     margin: float = 0.005,
-    limit_share: float = 1.0,
+    limit_share: float | None = None,
     acceleration: float | None = None,
     jerk: float | None = None,
     solver: str = "banded",
@@ -209,9 +209,9 @@ def optimize(
     scene: a file, a Scene, or a document as a dict. guide: finds the path of the first guess.
     minimize: "effort" or "time". duration: time to each goal [s]; None: at half of the velocity
     limits. intervals: between knots, to each goal. margin: least clearance [m]. limit_share: share
-    of the limits of velocity and torque that the motion may use. acceleration, jerk: limits of all
-    joints [rad/s^2 or m/s^2, and per s]. solver: "banded" or "ipopt". rate: points per second
-    [1/s]; None: the knots.
+    of the limits of velocity and torque that the motion may use; None: all of the velocities, 0.9
+    of the torques. acceleration, jerk: limits of all joints [rad/s^2 or m/s^2, and per s]. solver:
+    "banded" or "ipopt". rate: points per second [1/s]; None: the knots.
     """
     made = as_scene(scene, overrides_of(guide=guide, set=set))
     document, valid = _optimize(

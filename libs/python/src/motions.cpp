@@ -57,7 +57,8 @@ optimal::SceneMotionOptions options_of(const py::dict& given) {
   options.intervals = within("intervals", given["intervals"].cast<int>(), optimal::least_intervals,
                              optimal::most_intervals);
   options.margin_m = within("margin", given["margin"].cast<double>(), 0.0, 0.1);
-  options.limit_share = within("limit_share", given["limit_share"].cast<double>(), 0.01, 1.0);
+  if (const auto share = given["limit_share"].cast<std::optional<double>>())
+    options.limit_share = within("limit_share", *share, 0.01, 1.0);
   options.duration_s = number("duration");
   options.acceleration = number("acceleration");
   options.jerk = number("jerk");

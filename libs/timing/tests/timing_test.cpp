@@ -326,6 +326,49 @@ TEST_CASE("a trajectory's curve is the trajectory", "[timing][unit]") {
   }
 }
 
+TEST_CASE(
+    "a timed curve keeps its time within the limits, and is slower only where they ask for it",
+    "[timing][property]") {
+  Rng rng(33);
+  const model::Model arm(model::make_chain({6}));
+  dynamics::Workspace ws(arm);
+  const timing::Limits limits = limits_of(6, 2.0, 12.0, 90.0);
+  timing::TimeLaw law(arm, limits, {1, 0.01});
+  int slowed = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    scene::JointTrajectory given;
+    const double seconds = rng.uniform(1.5, 12.0);
+    given.time_s = VectorXd::LinSpaced(5, 0.0, seconds);
+    given.q = random_points(6, 5, rng);
+    given.v = MatrixXd::Zero(6, 5);
+    given.v.middleCols(1, 3) = 2.0 / seconds * random_points(6, 3, rng);
+    if (trial % 2 == 0) given.a = MatrixXd::Zero(6, 5);
+    timing::TimedPath motion;
+    motion.curve = timing::Curve(given);
+    if (!law.slow_down(motion)) continue;
+    VectorXd tau(6);
+    double most = 0.0, as_given = 0.0;
+    const auto used = [&](const State& at) {
+      dynamics::inverse_dynamics(arm, ws, at.q, at.v, at.a, tau);
+      return std::max({tau.cwiseQuotient(limits.torque).cwiseAbs().maxCoeff(),
+                       at.v.cwiseQuotient(limits.velocity).cwiseAbs().maxCoeff(),
+                       at.a.cwiseQuotient(limits.acceleration).cwiseAbs().maxCoeff()});
+    };
+    for (int k = 0; k <= 1500; ++k) {
+      most = std::max(most, used(state_at(motion, motion.duration_s() * k / 1500.0)));
+      State at(6);
+      given.at(seconds * k / 1500.0, at.q, at.v, at.a);
+      as_given = std::max(as_given, used(at));
+    }
+    CHECK(most <= 1.0);
+    CHECK(motion.speed.maxCoeff() <= 1.0 + 1e-9);
+    if (as_given < 0.99) CHECK(motion.duration_s() == Approx(seconds).epsilon(1e-9));
+    slowed += motion.duration_s() > 1.01 * seconds ? 1 : 0;
+  }
+  CHECK(slowed > 10);
+  CHECK(slowed < 35);
+}
+
 namespace {
 
 /// A planar arm whose joint space has two balls beside the way.

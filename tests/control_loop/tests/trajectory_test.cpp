@@ -61,6 +61,47 @@ TEST_CASE("an arm follows a trajectory in time, through a pause, without allocat
   if (test::counts_allocations()) CHECK(allocations == 0);
 }
 
+TEST_CASE("a trajectory that is proved is followed on its path, and one that is not says why",
+          "[control][trajectory]") {
+  scene::Scene scene = free_scene();
+  scene.safety.type = scene::SafetyType::shield;
+  std::string log;
+  control::Controller::Options options;
+  options.log = [&](std::int32_t, std::string_view line) { (log += line) += '\n'; };
+  scene::JointTrajectory trajectory = swing(scene, 0, 0.8);
+  scene.goals = {scene::trajectory_goal(trajectory)};
+  Loop loop(scene, options);
+  for (int k = 0; k < 1000; ++k) {
+    const control::Answer& answer = loop.tick();
+    REQUIRE(answer.reference != nullptr);
+    CHECK(answer.reference->certified);
+    CHECK(loop.controller.shield_report()->along_path);
+    loop.step(answer.torque);
+  }
+  CHECK_THAT(log, !Catch::Contains("the trajectory is"));
+
+  const auto answer_to = [&](const scene::JointTrajectory& other) {
+    log.clear();
+    loop.controller.set_goal(scene::trajectory_goal(other));
+    return log;
+  };
+  trajectory.v(0, 0) = 0.1;
+  CHECK(answer_to(trajectory) ==
+        "goal 1: the trajectory is followed without a proof: it begins or ends in motion\n");
+  trajectory.v(0, 0) = 0.0;
+  trajectory.time_s *= 0.3;
+  CHECK_THAT(answer_to(trajectory),
+             Catch::StartsWith("goal 1: the trajectory is followed more slowly: within the limits "
+                               "it takes "));
+  loop.controller.world().set_obstacle(
+      scene::read_scene(test::data_folder / "scenes/pillar.json").obstacles[0]);
+  trajectory = swing(scene, 0, 1.6);
+  CHECK_THAT(answer_to(trajectory),
+             Catch::StartsWith(
+                 "goal 1: the trajectory is followed without a proof: it is not proved to be clear "
+                 "at 0."));
+}
+
 TEST_CASE("an obstacle that appears in the way holds a trajectory up, and the arm goes around it",
           "[control][trajectory]") {
   scene::Scene scene = free_scene();

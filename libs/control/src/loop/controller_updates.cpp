@@ -310,7 +310,11 @@ void Controller::update_target() {
 void Controller::update_reference() {
   const scene::Goal& goal = goals_.goal();
   answer_.reference = nullptr;
-  if (!goal.trajectory || proved_trajectory() != nullptr) return reference_.stop();
+  if (const CertifiedPath* const path = proved_trajectory()) {
+    reference_.stop();
+    return follow(path);
+  }
+  if (!goal.trajectory) return reference_.stop();
   if (reference_.goal() != &goal) reference_.start(goal);
   answer_.reference = &reference_.update(period_s_, q(), v());
   // an arm that waits where its reference does has not stalled
@@ -369,30 +373,35 @@ const CertifiedPath* Controller::path_in_force() const noexcept {
   return motion.along_path() ? motion.path_stop().path() : nullptr;
 }
 
-// The motion along the path that a search has found, or that a goal has.
-void Controller::update_path() {
-  const CertifiedPath* path = proved_trajectory();
-  const bool is_given = path != nullptr;
-  if (!is_given && guidance_) path = guidance_->motion();
-  Shield* const shield = arm_->shield.get();
+void Controller::follow(const CertifiedPath* path) {
   if (path != path_reference_->path())
     path != nullptr ? path_reference_->start(*path) : path_reference_->stop();
-  if (shield != nullptr && shield->path_proof().path() != path)
-    shield->set_path(path, surroundings());
   on_path_ = false;
   if (path == nullptr) return;
   const ReferenceState& state =
       path_reference_->update({period_s_, q(), v(), answer_.stopping, arm_->view.speed_scale()});
   answer_.reference = &state;
   on_path_ = state.error < HAMELIN_ON_PATH;
+  if (!state.ended && state.rate > 0.0) goals_.forget_rest();
+}
+
+// A given path was followed when the goal was looked at. An arm that may not go on from where it
+// rests needs another path, and so does one whose given path is blocked.
+void Controller::update_path() {
+  const bool is_given = proved_trajectory() != nullptr;
+  if (!is_given) follow(guidance_ ? guidance_->motion() : nullptr);
+  const CertifiedPath* const path = path_reference_->path();
+  Shield* const shield = arm_->shield.get();
+  if (shield != nullptr && shield->path_proof().path() != path)
+    shield->set_path(path, surroundings());
+  if (path == nullptr) return;
   if (shield != nullptr)
     shield->note_path(
         path_reference_->next(static_cast<double>(drive_options_->delay_periods) * period_s_));
-  if (!state.ended && state.rate > 0.0) goals_.forget_rest();
-  // an arm that may not go on from where it rests needs another path
-  const bool held = answer_.stopping && arm_->stop().at_rest();
+  const bool held = answer_.stopping && arm_->stop().at_rest(),
+             blocked = is_given && shield != nullptr && shield->path_proof().blocked();
   held_s_ = held ? held_s_ + period_s_ : 0.0;
-  if (held_s_ < longest_held_s) return;
+  if (held_s_ < longest_held_s && !blocked) return;
   held_s_ = 0.0;
   if (is_given)
     forsaken_ = path;

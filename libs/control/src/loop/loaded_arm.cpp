@@ -41,7 +41,7 @@ std::vector<std::unique_ptr<const CertifiedPath>> LoadedArm::certify(
     if (!arm.log || result.cause.empty()) continue;
     arm.log(HAMELIN_LOG_INFO,
             fmt::format("goal {}: the trajectory is {}: {}", i + 1,
-                        proved ? "followed more slowly" : "not proved", result.cause));
+                        proved ? "followed more slowly" : "followed without a proof", result.cause));
   }
   return out;
 }

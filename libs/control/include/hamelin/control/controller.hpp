@@ -297,7 +297,9 @@ class Controller {
   void take_params();
   /// Lets the guide choose what the planner is shown.
   void update_guidance();
-  /// Moves on along the path that the guide has found or the goal has, if there is one.
+  /// Moves on along a path; null: there is none.
+  void follow(const CertifiedPath* path);
+  /// Follows the path that the guide has found, if the goal has none, and tells the shield of it.
   void update_path();
   /// That of the current goal; null if it has none, or the arm could not stay on it.
   [[nodiscard]] const CertifiedPath* proved_trajectory() const noexcept;

@@ -21,8 +21,8 @@ struct SceneMotionOptions {
   std::optional<double> acceleration, jerk;  ///< limits of all joints [rad/s² and rad/s³, or m]
   double time_effort_weight = 1e-3;          ///< see Problem
   /// Share of the limits of velocity and torque that the motion may use: the rest is for the
-  /// feedback of an arm that follows it.
-  double limit_share = 1.0;
+  /// feedback of an arm that follows it. None: all of the velocities, and 0.9 of the torques.
+  std::optional<double> limit_share;
   SolveOptions solve{};
 };
 
@@ -63,7 +63,7 @@ struct SceneMotion {
 /// Obstacles that are farther away count as being at this distance [m], which is more than the
 /// margin.
 [[nodiscard]] constexpr double influence_of(double margin_m) {
-  return std::max(0.1, 1.5 * margin_m);
+  return std::max(0.05, 1.5 * margin_m);
 }
 
 /// The problem of a scene's motions, but for start, goal, duration and clearance. The model must
