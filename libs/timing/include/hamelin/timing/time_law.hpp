@@ -48,7 +48,8 @@ class TimeLaw {
   [[nodiscard]] bool solve(TimedPath& out, double speed = 0.0);
   /// The motion of a curve whose parameter is the time, from rest to rest, slower than it was meant
   /// where the limits ask for that: docs/theory.md (19.15). Rates must not be bounded.
-  /// @param out, @return as in solve()
+  /// @param out its curve is given, the rest is set
+  /// @return whether there is a motion; else see cause()
   [[nodiscard]] bool slow_down(TimedPath& out);
   /// The duration of the motion from rest if rates are not bounded, and without an examination
   /// between the nodes; infinite if there is none.
