@@ -102,6 +102,24 @@ TEST_CASE("a trajectory that is proved is followed on its path, and one that is 
                  "at 0."));
 }
 
+TEST_CASE("a stop goes on along its trajectory while goals are replaced again and again",
+          "[control][trajectory]") {
+  scene::Scene scene = free_scene();
+  scene.safety.type = scene::SafetyType::shield;
+  scene.goals = {scene::trajectory_goal(swing(scene, 0, 0.8))};
+  Loop loop(scene);
+  for (int k = 0; k < 700; ++k) loop.step(loop.tick().torque);
+  loop.controller.stop("test");
+  for (int k = 0; k < 1000; ++k) {
+    if (k % 10 == 0)
+      loop.controller.set_goal(scene::trajectory_goal(swing(scene, 0, 0.4 + 1e-4 * k)));
+    loop.step(loop.tick().torque);
+    CHECK(loop.controller.shield_report()->along_path);
+  }
+  CHECK(loop.controller.shield_report()->at_rest);
+  CHECK(loop.state.v.norm() < 1e-3);
+}
+
 TEST_CASE("an obstacle that appears in the way holds a trajectory up, and the arm goes around it",
           "[control][trajectory]") {
   scene::Scene scene = free_scene();

@@ -28,8 +28,7 @@ constexpr double wanted_margin_m = 0.02;
 
 TrajectoryCertifier::TrajectoryCertifier(const scene::Scene& scene, const model::Model& model,
                                          const scene::SelfField* self, const MotionBounds& bounds)
-    : model_(model),
-      limits_(motion_limits(scene, model, bounds)),
+    : limits_(motion_limits(scene, model, bounds)),
       stop_acceleration_(bounds.changes.acceleration_max),
       enough_m_(std::max(wanted_margin_m, enough_margin_m(bounds.reserve))),
       law_(model, limits_, {1, nodes_spacing_s}),

@@ -161,6 +161,7 @@ void Controller::decide() {
   answer_.series = arm_->planner.command().series();
   propose();
   act();
+  release_motions();
   const Setpoint& sent = drive.send();
   answer_.torque = sent.torque;
   answer_.saturated = sent.saturated;

@@ -153,6 +153,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       path_reference_(std::make_unique<PathReference>(nominal_.dof())),
       goals_(goal_list_->goals, scene_.stall, arm_->model) {
   check_follows(scene_, plugin);
+  keep_motions(0, goal_list_->motions);
   expect_target(scene_.goals);
   answer_.torque = answer_.q_next = answer_.v_next = VectorXd::Zero(nominal_.dof());
   make_guidance();

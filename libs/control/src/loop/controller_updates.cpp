@@ -49,9 +49,31 @@ std::uint64_t Controller::set_goals(std::vector<scene::Goal> goals) {
   const std::lock_guard lock(goals_mutex_);
   newest_goals_ = goals;
   expect_target(goals);
-  mail_->goals.publish(std::make_unique<GoalList>(++goals_number_, std::move(goals),
+  keep_motions(++goals_number_, motions);
+  mail_->goals.publish(std::make_unique<GoalList>(goals_number_, std::move(goals),
                                                   std::move(motions), load_number_));
   return goals_number_;
+}
+
+// A stop may go on along the path of goals that are gone.
+void Controller::keep_motions(std::uint64_t number, const ProvedMotions& motions) {
+  std::erase_if(kept_motions_, [oldest = oldest_goals_.load(std::memory_order_acquire)](
+                                   const auto& kept) { return kept.first < oldest; });
+  if (std::any_of(motions.begin(), motions.end(), [](const auto& path) { return path != nullptr; }))
+    kept_motions_.emplace_back(number, motions);
+}
+
+void Controller::release_motions() {
+  if (oldest_goals_.load(std::memory_order_relaxed) == goal_list_->number) return;
+  const auto is_old = [&](const CertifiedPath* path) {
+    const auto& given = goal_list_->motions;
+    return path != nullptr && !(guidance_ && path == guidance_->motion()) &&
+           std::none_of(given.begin(), given.end(),
+                        [&](const auto& other) { return other.get() == path; });
+  };
+  const Shield* const shield = arm_->shield.get();
+  if (is_old(path_in_force()) || (shield != nullptr && is_old(shield->path_proof().path()))) return;
+  oldest_goals_.store(goal_list_->number, std::memory_order_release);
 }
 
 void Controller::expect_target(const std::vector<scene::Goal>& goals) {

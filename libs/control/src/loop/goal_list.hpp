@@ -17,7 +17,7 @@ namespace hamelin::control {
 /// A list of goals as the control loop and as its planner see it. Immutable once published.
 struct GoalList {
   /// Of each goal what its trajectory is proved as; null: it has none, or there is no proof.
-  using Motions = std::vector<std::unique_ptr<const CertifiedPath>>;
+  using Motions = std::vector<std::shared_ptr<const CertifiedPath>>;
   /// @param goals at least one @param motions one per goal @param load for which they are proved
   GoalList(std::uint64_t number, std::vector<scene::Goal> goals, Motions motions,
            std::uint64_t load);

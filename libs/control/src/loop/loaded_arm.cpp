@@ -30,18 +30,19 @@ LoadedArm::LoadedArm(const scene::Scene& scene, model::Model nominal, const Json
                      arm.drive.changes(scene)});
 }
 
-std::vector<std::unique_ptr<const CertifiedPath>> LoadedArm::certify(
+std::vector<std::shared_ptr<const CertifiedPath>> LoadedArm::certify(
     const std::vector<scene::Goal>& goals, const ArmSetup& arm) const {
-  std::vector<std::unique_ptr<const CertifiedPath>> out(goals.size());
+  std::vector<std::shared_ptr<const CertifiedPath>> out(goals.size());
   for (std::size_t i = 0; i < goals.size(); ++i) {
     if (!goals[i].trajectory || !trajectories_) continue;
     auto result = trajectories_->certify(*goals[i].trajectory, *arm.world.latest());
     const bool proved = result.motion != nullptr;
     out[i] = std::move(result.motion);
     if (!arm.log || result.cause.empty()) continue;
-    arm.log(HAMELIN_LOG_INFO,
-            fmt::format("goal {}: the trajectory is {}: {}", i + 1,
-                        proved ? "followed more slowly" : "followed without a proof", result.cause));
+    arm.log(
+        HAMELIN_LOG_INFO,
+        fmt::format("goal {}: the trajectory is {}: {}", i + 1,
+                    proved ? "followed more slowly" : "followed without a proof", result.cause));
   }
   return out;
 }

@@ -61,7 +61,7 @@ struct LoadedArm {
 
   /// Proves the trajectories of goals in the newest world. For writers, one at a time.
   /// @return for each goal its motion; null without a trajectory or a proof
-  [[nodiscard]] std::vector<std::unique_ptr<const CertifiedPath>> certify(
+  [[nodiscard]] std::vector<std::shared_ptr<const CertifiedPath>> certify(
       const std::vector<scene::Goal>& goals, const ArmSetup& arm) const;
 
   /// The stop that acts where no answer does.

@@ -286,6 +286,12 @@ class Controller {
   void check_arm();
   void make_guidance();
   void take_goals();
+  using ProvedMotions = std::vector<std::shared_ptr<const CertifiedPath>>;
+  /// Keeps the motions of goals, and forgets those that the tick has released. The caller has
+  /// locked load_mutex_.
+  void keep_motions(std::uint64_t number, const ProvedMotions& motions);
+  /// Releases the motions of earlier goals, unless a stop or its proof is still along one of them.
+  void release_motions();
   /// Notes whether these goals follow a streamed target.
   void expect_target(const std::vector<scene::Goal>& goals);
   template <class Sample>
@@ -333,6 +339,8 @@ class Controller {
   mutable std::mutex goals_mutex_, load_mutex_;
   std::uint64_t goals_number_ = 0, params_number_ = 0, load_number_ = 0;  ///< of the newest
   std::vector<scene::Goal> newest_goals_;
+  std::vector<std::pair<std::uint64_t, ProvedMotions>> kept_motions_;  ///< by number of the goals
+  std::atomic<std::uint64_t> oldest_goals_{0};  ///< whose motions the tick may still use
   LoadedArm* newest_arm_;  ///< for writers: the last that was published, or the first
   std::vector<scene::Payload> attached_, accepted_;  ///< with the newest load, and one in use
   std::atomic<std::uint64_t> refused_load_{0}, used_load_{0};
