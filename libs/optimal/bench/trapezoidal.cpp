@@ -92,8 +92,8 @@ bool Trapezoidal::evaluate(const VectorXd& x) {
   values_.segment(ends + 2 * n_, 2 * n_) = x.segment(q_of(N_), 2 * n_);
   values_.segment(ends + 4 * n_, 3 * n_ * (N_ + 1)) = x.head(3 * n_ * (N_ + 1));
   for (Index k = 1; each_ > 0 && k < N_; ++k) {
-    problem_.clearance->evaluate(VectorXd(x.segment(q_of(k), n_)), distances_,
-                                 gradients_[static_cast<std::size_t>(k)]);
+    problem_.clearance->evaluate_all(VectorXd(x.segment(q_of(k), n_)), distances_,
+                                     gradients_[static_cast<std::size_t>(k)]);
     values_.segment(first_distance() + each_ * (k - 1), each_) = distance_scale * distances_;
   }
   const double T = h_ * static_cast<double>(N_);

@@ -46,7 +46,10 @@ InteriorPoint::InteriorPoint(Transcription& program, const SolveOptions& options
   for_each_side([&](Side& side) {
     side.slack = VectorXd::Ones(program.rows());
     side.multiplier = side.residual = side.slack_step = side.multiplier_step = row_;
+    for (Index r = 0; r < program.steady_rows(); ++r)
+      if (side.bounds(r)) side.rows.push_back(r);
   });
+  awake_.assign(static_cast<std::size_t>(program.rows() - program.steady_rows()), false);
 }
 
 // False if the program has no finite numbers at x.
@@ -55,13 +58,20 @@ bool InteriorPoint::start(VectorXd x) {
   if (!program_.evaluate(x_)) return false;
   program_.gradient(gradient_);
   scale_ = std::min(1.0, gradient_max / gradient_.lpNorm<Eigen::Infinity>());
+  for (Index r = program_.steady_rows(); r < program_.rows(); ++r) {
+    lower_.slack[r] = lower_.inside(program_, r);
+    if (lower_.slack[r] > 0.0)
+      resting_log_ += std::log(lower_.slack[r]);
+    else
+      awaken(r);
+  }
+  wake();
   for_each_side([&](Side& side) {
-    for (Index r = 0; r < program_.rows(); ++r) {
-      if (!side.bounds(r)) continue;
-      side.slack[r] = std::max(first_slack_, side.sign * (program_.values()[r] - side.bound[r]));
+    for (const Index r : side.rows) {
+      side.slack[r] = std::max(first_slack_, side.inside(program_, r));
       side.multiplier[r] = mu_ / side.slack[r];
-      bounds_ += 1.0;
     }
+    for (Index r = 0; r < program_.rows(); ++r) bounds_ += side.bounds(r) ? 1.0 : 0.0;
     find_residuals(side);
   });
   first_violation_ = std::max(1.0, filter_point().violation);
@@ -69,10 +79,41 @@ bool InteriorPoint::start(VectorXd x) {
   return true;
 }
 
+void InteriorPoint::awaken(Index row) {
+  awake_[static_cast<std::size_t>(row - program_.steady_rows())] = true;
+  lower_.rows.push_back(row);
+  lower_.multiplier[row] = mu_ / lower_.slack[row];
+  lower_.residual[row] = lower_.slack_step[row] = lower_.multiplier_step[row] = 0.0;
+}
+
+// Rows whose distances have come below their bounds.
+void InteriorPoint::wake() {
+  program_.for_each_near([&](Index r) {
+    if (awake_[static_cast<std::size_t>(r - program_.steady_rows())]) return;
+    resting_log_ -= std::log(lower_.slack[r]);
+    awaken(r);
+  });
+}
+
+void InteriorPoint::rest() {
+  awake_.assign(awake_.size(), false);
+  const auto awake = [&](Index r) {
+    return awake_[static_cast<std::size_t>(r - program_.steady_rows())];
+  };
+  program_.for_each_near([&](Index r) { awake(r) = true; });
+  std::erase_if(lower_.rows, [&](Index r) {
+    if (r < program_.steady_rows() || awake(r)) return false;
+    if (lower_.slack[r] != lower_.inside(program_, r)) {
+      awake(r) = true;
+      return false;
+    }
+    resting_log_ += std::log(lower_.slack[r]);
+    return true;
+  });
+}
+
 void InteriorPoint::find_residuals(Side& side) const {
-  for (Index r = 0; r < program_.rows(); ++r)
-    side.residual[r] =
-        side.bounds(r) ? side.sign * (program_.values()[r] - side.bound[r]) - side.slack[r] : 0.0;
+  for (const Index r : side.rows) side.residual[r] = side.inside(program_, r) - side.slack[r];
 }
 
 // docs/theory.md (18.9). Multipliers far above one measure stationarity, as in IPOPT.
@@ -82,18 +123,33 @@ InteriorPoint::Errors InteriorPoint::errors(double mu) {
   right_ = gradient_;
   row_ = upper_.multiplier - lower_.multiplier;
   program_.for_each_entry([&](Index r, Index v, double d) { right_[v] += d * row_[r]; });
-  const double sum = upper_.multiplier.sum() + lower_.multiplier.sum(),
-               mean = sum / std::max<double>(1.0, 2.0 * static_cast<double>(program_.rows())),
-               divisor = std::max(100.0, mean) / 100.0;
-  Errors out{right_.allFinite() ? right_.lpNorm<Eigen::Infinity>() / divisor : infinity, 0.0, 0.0};
+  double sum = 0.0;
   for_each_side([&](const Side& side) {
-    for (Index r = 0; r < program_.rows(); ++r) {
-      if (!side.bounds(r)) continue;
+    for (const Index r : side.rows) sum += side.multiplier[r];
+  });
+  const double mean = sum / std::max<double>(1.0, 2.0 * static_cast<double>(program_.rows())),
+               divisor = std::max(100.0, mean) / 100.0;
+  // at rows that rest, slack · multiplier is the barrier's
+  Errors out{right_.allFinite() ? right_.lpNorm<Eigen::Infinity>() / divisor : infinity, 0.0,
+             std::abs(mu_ - mu) / divisor};
+  for_each_side([&](const Side& side) {
+    for (const Index r : side.rows) {
       grow(out.violation, std::abs(side.residual[r]));
       grow(out.complementarity, std::abs(side.slack[r] * side.multiplier[r] - mu) / divisor);
     }
   });
   return out;
+}
+
+// docs/theory.md (18.20)
+bool InteriorPoint::cheap_enough(const Errors& now) const {
+  if (!(options_.cost_tolerance > 0.0) || !(now.violation <= options_.violation_max()))
+    return false;
+  double gap = 0.0;
+  for_each_side([&](const Side& side) {
+    for (const Index r : side.rows) gap += side.slack[r] * side.multiplier[r];
+  });
+  return gap <= options_.cost_tolerance * scale_ * std::abs(program_.cost());
 }
 
 // docs/theory.md (18.12). Where distances have kinks, stationarity may stay large although cost and
@@ -116,8 +172,7 @@ bool InteriorPoint::find_direction() {
   weights_.setZero();
   VectorXd push = VectorXd::Zero(rows);
   for_each_side([&](const Side& side) {
-    for (Index r = 0; r < rows; ++r) {
-      if (!side.bounds(r)) continue;
+    for (const Index r : side.rows) {
       const double weight = side.multiplier[r] / side.slack[r];
       weights_[r] += weight;
       push[r] += side.sign * (mu_ / side.slack[r] - weight * side.residual[r]);
@@ -147,34 +202,38 @@ bool InteriorPoint::factor() {
 }
 
 void InteriorPoint::find_side_steps(Side& side) {
-  for (Index r = 0; r < program_.rows(); ++r) {
-    if (!side.bounds(r)) continue;
+  for (const Index r : side.rows) {
     side.slack_step[r] = side.sign * row_step_[r] + side.residual[r];
     side.multiplier_step[r] = mu_ / side.slack[r] - side.multiplier[r] -
                               side.multiplier[r] / side.slack[r] * side.slack_step[r];
   }
 }
 
-double InteriorPoint::largest_step(const VectorXd& x, const VectorXd& dx) const {
+double InteriorPoint::largest_step(const Side& side, const VectorXd& x, const VectorXd& dx) const {
   const double share = 1.0 - std::min(least_share, mu_);
   double step = 1.0;
-  for (Index r = 0; r < x.size(); ++r)
+  for (const Index r : side.rows)
     if (dx[r] < 0.0) step = std::min(step, -share * x[r] / dx[r]);
   return step;
 }
 
 // docs/theory.md (18.12)
 Filter::Point InteriorPoint::filter_point() const {
-  double barrier = 0.0;
-  for_each_side([&](const Side& side) { barrier += side.slack.array().log().sum(); });
-  return {lower_.residual.lpNorm<1>() + upper_.residual.lpNorm<1>(),
-          scale_ * program_.cost() - mu_ * barrier};
+  double barrier = resting_log_, violation = 0.0;
+  for_each_side([&](const Side& side) {
+    for (const Index r : side.rows) {
+      barrier += std::log(side.slack[r]);
+      violation += std::abs(side.residual[r]);
+    }
+  });
+  return {violation, scale_ * program_.cost() - mu_ * barrier};
 }
 
 double InteriorPoint::barrier_slope() const {
   double slope = gradient_.dot(dx_);
-  for_each_side(
-      [&](const Side& side) { slope -= mu_ * side.slack_step.cwiseQuotient(side.slack).sum(); });
+  for_each_side([&](const Side& side) {
+    for (const Index r : side.rows) slope -= mu_ * side.slack_step[r] / side.slack[r];
+  });
   return slope;
 }
 
@@ -192,9 +251,8 @@ void InteriorPoint::count_small_decreases(const Filter::Point& before, const Fil
 // Where a row is inside its bound, the slack is its distance from the bound, so that the barrier
 // itself sees how the row bends; elsewhere it takes its own step.
 void InteriorPoint::take_slacks(Side& side, const VectorXd& before, double step) const {
-  for (Index r = 0; r < program_.rows(); ++r) {
-    if (!side.bounds(r)) continue;
-    const double inside = side.sign * (program_.values()[r] - side.bound[r]);
+  for (const Index r : side.rows) {
+    const double inside = side.inside(program_, r);
     side.slack[r] =
         inside >= least_share * before[r] ? inside : before[r] + step * side.slack_step[r];
   }
@@ -222,12 +280,13 @@ bool InteriorPoint::take_step() {
   const double slope = barrier_slope();
   const Filter::Point before = filter_point();
   merit_.begin(before, slope);
-  double step = std::min(largest_step(lower_.slack, lower_.slack_step),
-                         largest_step(upper_.slack, upper_.slack_step));
+  double step = std::min(largest_step(lower_, lower_.slack, lower_.slack_step),
+                         largest_step(upper_, upper_.slack, upper_.slack_step));
   bool accepted = false;
   for (int k = 0; k < backtracks_max && !accepted; ++k, step *= 0.5) {
     x_ = x + step * dx_;
     if (!program_.evaluate(x_)) continue;
+    wake();
     take_slacks(lower_, slack_l, step);
     take_slacks(upper_, slack_u, step);
     const Filter::Point now = filter_point();
@@ -235,18 +294,19 @@ bool InteriorPoint::take_step() {
     if (accepted) count_small_decreases(before, now);
   }
   if (!accepted) restore(x, slack_l, slack_u);
+  rest();
   for_each_side([&](Side& side) {
-    side.multiplier += largest_step(side.multiplier, side.multiplier_step) * side.multiplier_step;
+    const double share = largest_step(side, side.multiplier, side.multiplier_step);
+    for (const Index r : side.rows) side.multiplier[r] += share * side.multiplier_step[r];
     keep_multipliers_near(side);
   });
   return accepted;
 }
 
 void InteriorPoint::keep_multipliers_near(Side& side) const {
-  for (Index r = 0; r < program_.rows(); ++r)
-    if (side.bounds(r))
-      side.multiplier[r] = std::clamp(side.multiplier[r], mu_ / (multiplier_range * side.slack[r]),
-                                      multiplier_range * mu_ / side.slack[r]);
+  for (const Index r : side.rows)
+    side.multiplier[r] = std::clamp(side.multiplier[r], mu_ / (multiplier_range * side.slack[r]),
+                                    multiplier_range * mu_ / side.slack[r]);
 }
 
 Solution InteriorPoint::solve(VectorXd x) {
@@ -258,7 +318,7 @@ Solution InteriorPoint::solve(VectorXd x) {
   for (out.iterations = 0;; ++out.iterations) {
     const Errors now = errors(0.0);
     out.stationarity = now.stationarity;
-    out.converged = now.within(options_.tolerance);
+    out.converged = now.within(options_.tolerance) || cheap_enough(now);
     if (out.converged) break;
     lower_barrier();
     if (out.iterations == options_.iterations_max) {

@@ -31,7 +31,11 @@ class InteriorPoint {
     double sign;
     const VectorXd& bound;
     VectorXd slack{}, multiplier{}, residual{}, slack_step{}, multiplier_step{};
+    std::vector<Index> rows{};  ///< those that are bounded and do not rest
     [[nodiscard]] bool bounds(Index r) const { return std::isfinite(bound[r]); }
+    [[nodiscard]] double inside(const Transcription& program, Index r) const {
+      return sign * (program.values()[r] - bound[r]);
+    }
   };
   /// How far an iterate is from a solution of the problem with the barrier μ.
   struct Errors {
@@ -43,8 +47,12 @@ class InteriorPoint {
   };
 
   [[nodiscard]] bool start(VectorXd x);
+  void awaken(Index row);
+  void wake();
+  void rest();
   void find_residuals(Side& side) const;
   [[nodiscard]] Errors errors(double mu);
+  [[nodiscard]] bool cheap_enough(const Errors& now) const;
   [[nodiscard]] bool can_lower_barrier() const noexcept { return mu_ > options_.tolerance / 10.0; }
   void lower_barrier();
   [[nodiscard]] bool find_direction();
@@ -58,7 +66,7 @@ class InteriorPoint {
   [[nodiscard]] bool accepts(const Filter::Point& before, const Filter::Point& now, double slope,
                              double step);
   void count_small_decreases(const Filter::Point& before, const Filter::Point& now);
-  [[nodiscard]] double largest_step(const VectorXd& x, const VectorXd& dx) const;
+  [[nodiscard]] double largest_step(const Side& side, const VectorXd& x, const VectorXd& dx) const;
   void keep_multipliers_near(Side& side) const;
   template <class F>
   void for_each_side(F&& f) {
@@ -79,11 +87,15 @@ class InteriorPoint {
   BandedMatrix hessian_;
   Side lower_, upper_;
   VectorXd x_, dx_, gradient_, right_, row_, weights_, row_step_;
-  double scale_ = 1.0;  ///< of the cost
+  /// Of the rows behind the steady ones, which have lower bounds: whether they do not rest. Where
+  /// nothing is near, they are constant and rest, each with its slack.
+  std::vector<bool> awake_;
+  double resting_log_ = 0.0;  ///< Σ log(slack) of those that rest
+  double scale_ = 1.0;        ///< of the cost
   Filter filter_;
   Merit merit_;
   double first_violation_ = 1.0;  ///< at the guess, at least 1
-  double bounds_ = 0.0;           ///< number of finite ones
+  double bounds_ = 0.0;           ///< number of those that do not rest at the guess
   bool near_minimum_ = false;     ///< whether the last step won little beside what μ leaves open
   int small_decreases_ = 0;       ///< of cost and violation, in a row
 };

@@ -19,6 +19,7 @@ constexpr double decimetre = 0.1;
 constexpr double first_reserve_m = 2e-4;     // of the margin
 constexpr double coarse_shortfall_m = 5e-4;  // of the margin: the places of clearance are too few
 
+constexpr int slower_max = 3;             // times that a motion is slowed down
 constexpr double least_shortfall = 1e-6;  // of a proof that fails, in decimetres
 
 // Excesses of torques are shares of their limits.
@@ -47,7 +48,16 @@ struct TorqueShares {
   double largest = 0.0, time_s = 0.0;  // and where it is
   Index joint = 0;
   MatrixXd by_knot;  // dof × (N + 1), the largest in the intervals around each knot
+  // Factor of the duration with which they are kept, if the motion is otherwise the same: 1 or
+  // more, infinite if there is none.
+  double slower = 1.0;
 };
+
+// docs/theory.md (18.21)
+double slower_for(double torque, double holding, double limit) {
+  const double room = torque > 0.0 ? limit - holding : limit + holding;
+  return room > 0.0 ? std::sqrt(std::abs(torque - holding) / room) : infinity;
+}
 
 TorqueShares torque_shares(const Problem& problem, const TimedMotion& motion) {
   const VectorXd& limit = problem.limits.torque;
@@ -55,21 +65,54 @@ TorqueShares torque_shares(const Problem& problem, const TimedMotion& motion) {
   out.by_knot = MatrixXd::Zero(limit.size(), motion.intervals() + 1);
   if (limit.size() == 0) return out;
   dynamics::Workspace ws(*problem.model);
-  VectorXd torque(limit.size());
+  VectorXd torque(limit.size()), holding(limit.size()), q, v, a;
   constexpr Index per_interval = 16;
   for (Index i = 0; i <= per_interval * motion.intervals(); ++i) {
     const double time = motion.step_s * static_cast<double>(i) / static_cast<double>(per_interval);
-    torque_at(*problem.model, ws, motion, time, torque);
+    motion.at(time, q, v, a);
+    dynamics::inverse_dynamics(*problem.model, ws, q, v, a, torque);
+    if ((torque.cwiseAbs().array() > limit.array()).any())
+      dynamics::gravity_torque(*problem.model, ws, q, holding);
     const Index before = i / per_interval, after = (i + per_interval - 1) / per_interval;
     for (Index j = 0; j < limit.size(); ++j) {
       const double given = std::abs(torque[j]) / limit[j],
                    share = std::isnan(given) ? infinity : given;
       for (const Index k : {before, after}) out.by_knot(j, k) = std::max(out.by_knot(j, k), share);
+      if (share > 1.0)
+        out.slower = std::max(out.slower, slower_for(torque[j], holding[j], limit[j]));
       if (share > out.largest) out.largest = share, out.time_s = time, out.joint = j;
     }
   }
   return out;
 }
+
+MatrixXd inner_points(const MatrixXd& control) {
+  return control.middleCols(1, control.cols() - 2);
+}
+
+// A motion as a point of the program without clearance.
+class Rows {
+ public:
+  Rows(const Problem& asked, int intervals, const TimedMotion& motion)
+      : problem_(without_clearance(asked, intervals, motion.duration_s())), program_(problem_) {
+    (void)program_.evaluate(program_.variables_of(inner_points(motion.control)));
+  }
+  [[nodiscard]] double violation(std::string* what = nullptr) const {
+    return program_.violation(what);
+  }
+  [[nodiscard]] double cost() const { return program_.cost(); }
+  [[nodiscard]] const MatrixXd& torques() const { return program_.torques(); }
+
+ private:
+  static Problem without_clearance(Problem problem, int intervals, double duration_s) {
+    problem.intervals = intervals;
+    problem.duration_s = duration_s;
+    problem.clearance = nullptr;
+    return problem;
+  }
+  Problem problem_;
+  Transcription program_;
+};
 
 // Solves a problem, and again with tighter bounds or more knots until the motion keeps what was
 // asked for at all times, docs/theory.md (18.19).
@@ -109,28 +152,47 @@ class Refinement {
     Optimized out;
     out.solution = solve(problem_, guess_, options_);
     out.iterations = out.solution.iterations;
-    solved_ = out.solution.violation <= options_.tolerance;
+    solved_ = out.solution.violation <= options_.violation_max();
     out.motion = {out.solution.step_s, out.solution.control};
     out.clearance_points = problem_.clearance_points;
     if (!out.motion.well_formed()) return out;
-    out.proof = prove(out.motion, view_, {asked_.margin_m, asked_.begin_s});
     shares_ = torque_shares(asked_, out.motion);
+    for (int i = 0; i < slower_max && slow_down(out); ++i)
+      shares_ = torque_shares(asked_, out.motion);
     out.torque_share = shares_.largest;
+    out.proof = prove(out.motion, view_, {asked_.margin_m, asked_.begin_s});
     judge(out);
     return out;
   }
 
+  // Violations of rates and torques that are small cost less time this way than another solution
+  // takes to find. False if that is not so.
+  bool slow_down(Optimized& out) const {
+    if (options_.cost_tolerance <= 0.0 || asked_.objective != Objective::time ||
+        !asked_.v_start.isZero(0.0) || !asked_.v_goal.isZero(0.0))
+      return false;
+    const double violation = rows_of(out).violation(),
+                 factor = std::max(shares_.slower, 1.0 + violation);
+    if (violation <= options_.tolerance && shares_.largest <= 1.0) return false;
+    if (!(factor <= 1.0 + options_.cost_tolerance)) return false;
+    out.motion.step_s *= factor + options_.tolerance;
+    return true;
+  }
+
+  // What was asked for at the knots, without clearance, which the proof examines.
+  [[nodiscard]] Rows rows_of(const Optimized& out) const {
+    return {asked_, problem_.intervals, out.motion};
+  }
+
   // The violation of what was asked for, at the knots and between them.
   void judge(Optimized& out) const {
-    Problem rows = asked_;
-    rows.intervals = problem_.intervals;
-    rows.duration_s = out.motion.duration_s();
-    rows.clearance = nullptr;  // the proof examines it
-    Transcription program(rows);
-    (void)program.evaluate(program.variables_of(inner_points(out.motion.control)));
+    const Rows rows = rows_of(out);
     Solution& s = out.solution;
     s.violated.clear();
-    s.violation = program.violation(&s.violated);
+    s.violation = rows.violation(&s.violated);
+    s.cost = rows.cost();
+    s.torque = rows.torques();
+    s.step_s = out.motion.step_s;
     const auto add = [&](double violation, const std::string& what) {
       if (violation <= s.violation) return;
       s.violation = violation;
@@ -156,18 +218,14 @@ class Refinement {
     // without a motion at the knots, more of them help only where torques are what is violated
     if (!solved_ && first && !(coarse && asked_.objective == Objective::time)) return false;
     if (!found.proof.certified && !reserve_clearance(found.proof)) return false;
-    problem_.duration_s = found.motion.duration_s();
     options_.near_solution = true;
+    problem_.duration_s = found.motion.duration_s();
     guess_ = inner_points(found.motion.control);
     if (coarse)
       add_knots(found.motion, excess);
     else if (excess > 0.0)
       reserve_torques();
     return true;
-  }
-
-  static MatrixXd inner_points(const MatrixXd& control) {
-    return control.middleCols(1, control.cols() - 2);
   }
 
   // The torques at the knots differ from those along the motion by O(h²).

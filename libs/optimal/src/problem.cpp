@@ -28,6 +28,25 @@ Limits Limits::of(const model::Model& model) {
   return out;
 }
 
+void NearDistances::add(Index row, double distance, const VectorXd& gradient) {
+  const Index i = size();
+  if (gradients_.cols() <= i) gradients_.conservativeResize(gradient.size(), 2 * i + 8);
+  rows_.push_back(row);
+  distances_.push_back(distance);
+  gradients_.col(i) = gradient;
+}
+
+void Clearance::evaluate_all(const VectorXd& q, VectorXd& distances, MatrixXd& gradients) {
+  NearDistances near;
+  evaluate(q, near);
+  distances = far();
+  gradients = MatrixXd::Zero(q.size(), rows());
+  for (Index i = 0; i < near.size(); ++i) {
+    distances[near.row(i)] = near.distance(i);
+    gradients.col(near.row(i)) = near.gradient(i);
+  }
+}
+
 namespace {
 
 void check_size(const char* what, const VectorXd& x, Index n, bool may_be_empty) {
@@ -104,7 +123,7 @@ void check_clearance(const Problem& problem, const End& end) {
   if (problem.clearance == nullptr || problem.clearance->rows() == 0) return;
   VectorXd distances(problem.clearance->rows());
   MatrixXd gradients(end.q.size(), distances.size());
-  problem.clearance->evaluate(end.q, distances, gradients);
+  problem.clearance->evaluate_all(end.q, distances, gradients);
   if (!distances.allFinite())
     refuse(fmt::format("{}: a clearance is not finite, expected finite numbers", end.name));
   if (const double least = distances.minCoeff(); least < problem.margin_m)

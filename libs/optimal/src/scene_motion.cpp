@@ -157,6 +157,9 @@ SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& 
   Problem problem = problem_of(scene, options, model);
   const VectorXd q_lower = problem.limits.position_min, q_upper = problem.limits.position_max;
   problem.v_goal = rest;
+  SolveOptions solve = options.solve;
+  if (options.objective == Objective::time)
+    solve.cost_tolerance = std::max(solve.cost_tolerance, options.time_tolerance);
   for (std::size_t i = 0; i < scene.goals.size(); ++i) {
     const MatrixXd points = way_points(scene.goals[i], q, i < paths.size() ? &paths[i] : nullptr);
     problem.q_start = q;
@@ -167,7 +170,7 @@ SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& 
     problem.duration_s =
         options.duration_s.value_or(slow_duration(points, problem.limits.velocity));
     try {
-      out.goals.push_back({optimize(problem, points, view, options.solve)});
+      out.goals.push_back({optimize(problem, points, view, solve)});
     } catch (const Error& e) {
       if (e.code() != ErrorCode::invalid) throw;
       refuse_scene(scene, fmt::format("/goals/{}: {}", i, e.what()));

@@ -97,7 +97,7 @@ class Prover {
     Node node{place, {}, {}, infinity};
     const double time = place * motion_.step_s;
     motion_.at(time, node.q, v_, node.a);
-    view_.look(node.q, options_.begin_s + time);
+    view_.glance(node.q, options_.begin_s + time);
     if (view_.has_obstacles()) node.clearance = view_.clearance_m();
     if (view_.has_self()) node.clearance = std::min(node.clearance, view_.self_clearance_m());
     return node;

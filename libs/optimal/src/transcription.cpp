@@ -18,6 +18,7 @@ Transcription::Transcription(const Problem& problem)
       upper_(Eigen::Map<const VectorXd>(bounds_.upper.data(), bounds_.size())),
       values_(VectorXd::Zero(bounds_.size())) {
   points_.q = MatrixXd::Zero(layout_.joints(), layout_.points());
+  places_.fill_far(values_.data() + steady_rows());
 }
 
 BandedMatrix Transcription::hessian_matrix() const {

@@ -20,6 +20,9 @@ class Transcription {
   [[nodiscard]] const Layout& layout() const noexcept { return layout_; }
   [[nodiscard]] Index variables() const noexcept { return layout_.variables(); }
   [[nodiscard]] Index rows() const noexcept { return lower_.size(); }
+  /// The first rows, whose derivatives never vanish for all x; the rest are clearances, which are
+  /// constant where nothing is near.
+  [[nodiscard]] Index steady_rows() const noexcept { return rows() - places_.rows(); }
   [[nodiscard]] const VectorXd& lower() const noexcept { return lower_; }
   [[nodiscard]] const VectorXd& upper() const noexcept { return upper_; }
   /// A matrix of the shape of the Hessian.
@@ -34,6 +37,11 @@ class Transcription {
   [[nodiscard]] double cost() const noexcept { return cost_; }
   [[nodiscard]] const VectorXd& values() const noexcept { return values_; }
   void gradient(VectorXd& out) const;
+  /// Calls f(row) for the rows behind the steady ones that are not constant there.
+  template <class F>
+  void for_each_near(F&& f) const {
+    places_.for_each_near([&](Index r) { f(steady_rows() + r); });
+  }
   /// Calls f(row, variable, derivative) for the entries of J; with `all` for the same ones in the
   /// same order at every x.
   template <bool all = false, class F>

@@ -125,12 +125,14 @@ TEST_CASE("a trial that was rejected is not kept as the iterate", "[optimal]") {
   struct AtTheGuess final : Clearance {
     std::vector<VectorXd> known;
     bool learning = true;
+    VectorXd bound = VectorXd::Ones(1);
     [[nodiscard]] Index rows() const override { return 1; }
-    void evaluate(const VectorXd& q, VectorXd& distances, MatrixXd& gradients) override {
+    [[nodiscard]] const VectorXd& far() const override { return bound; }
+    void evaluate(const VectorXd& q, NearDistances& near) override {
+      near.clear();
       if (learning) known.push_back(q);
       const bool found = std::find(known.begin(), known.end(), q) != known.end();
-      distances.setConstant(found ? 1.0 : std::nan(""));
-      gradients.setZero();
+      if (!found) near.add(0, std::nan(""), VectorXd::Zero(7));
     }
   } clearance;
   const model::Model arm(model::make_chain({}));

@@ -40,11 +40,11 @@ TEST_CASE("gradients of clearances agree with differences", "[optimal][world]") 
   int compared = 0;
   for (int i = 0; i < 20; ++i) {
     const VectorXd q = scene.start_q + test::random_joints(rng, 7, 0.8);
-    clearance.evaluate(q, d, gradients);
+    clearance.evaluate_all(q, d, gradients);
     const VectorXd direction = test::random_joints(rng, 7, 1.0);
     constexpr double step = 1e-6;
-    clearance.evaluate(q + step * direction, ahead, unused);
-    clearance.evaluate(q - step * direction, back, unused);
+    clearance.evaluate_all(q + step * direction, ahead, unused);
+    clearance.evaluate_all(q - step * direction, back, unused);
     for (Index r = 0; r < rows; ++r) {
       // not where the nearest point jumps in between
       if (std::abs(ahead[r] + back[r] - 2.0 * d[r]) > 1e-9) continue;
@@ -54,6 +54,62 @@ TEST_CASE("gradients of clearances agree with differences", "[optimal][world]") 
     }
   }
   CHECK(compared > 100);
+}
+
+TEST_CASE("distances at their bounds have no effect on the solution", "[optimal][world]") {
+  // Gives all distances, also those at their bounds.
+  struct AllOf final : Clearance {
+    explicit AllOf(Clearance& of) : of_(of) {}
+    [[nodiscard]] Index rows() const override { return of_.rows(); }
+    [[nodiscard]] const VectorXd& far() const override { return of_.far(); }
+    void evaluate(const VectorXd& q, NearDistances& near) override {
+      VectorXd distances;
+      MatrixXd gradients;
+      of_.evaluate_all(q, distances, gradients);
+      near.clear();
+      for (Index r = 0; r < rows(); ++r) near.add(r, distances[r], gradients.col(r));
+    }
+    Clearance& of_;
+  };
+  const scene::Scene scene = scene_of(pillar_scene());
+  const model::Model model = control::load_model(scene);
+  control::WorldView view(scene, model, influence_of(0.005));
+  WorldClearance clearance(model, view);
+  AllOf all(clearance);
+  SceneMotionOptions options;
+  options.objective = GENERATE(Objective::effort, Objective::time);
+  options.intervals = 20;
+  Problem problem = problem_of(scene, options, model);
+  problem.q_start = scene.start_q;
+  problem.q_goal = scene.goals[0].q;
+  problem.v_start = problem.v_goal = VectorXd::Zero(7);
+  problem.duration_s = 3.0;
+  MatrixXd ends(7, 2);
+  ends << problem.q_start, problem.q_goal;
+  problem.clearance = &clearance;
+  const Solution few = solve(problem, guess_along(ends, 20));
+  problem.clearance = &all;
+  const Solution many = solve(problem, guess_along(ends, 20));
+  REQUIRE(few.violation <= 1e-8);
+  CHECK(few.cost == Approx(many.cost).epsilon(1e-7));
+  CHECK((few.control - many.control).cwiseAbs().maxCoeff() < 0.01);  // where the cost is flat
+}
+
+TEST_CASE("least time to within a share of it takes fewer iterations", "[optimal][world]") {
+  const scene::Scene scene = scene_of(pillar_scene());
+  SceneMotionOptions options;
+  options.objective = Objective::time;
+  options.margin_m = GENERATE(0.002, 0.008);
+  options.time_tolerance = 0.0;
+  const SceneMotion exact = optimize_scene(scene, options);
+  options.time_tolerance = 5e-3;
+  const SceneMotion near = optimize_scene(scene, options);
+  REQUIRE(exact.valid());
+  REQUIRE(near.valid());
+  CAPTURE(exact.duration_s(), near.duration_s());
+  CHECK(near.duration_s() < 1.01 * exact.duration_s());
+  CHECK(near.goals[0].found.iterations < exact.goals[0].found.iterations);
+  CHECK(near.goals[0].found.torque_share <= 1.0);
 }
 
 TEST_CASE("an arm goes around a pillar, proved clear", "[optimal][world]") {

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
+#include <vector>
 
 #include "hamelin/model/model.hpp"
 
@@ -28,16 +29,42 @@ struct Limits {
   static Limits of(const model::Model& model);
 };
 
+/// The distances at one configuration that are below their bounds: row by row, each once.
+class NearDistances {
+ public:
+  void clear() noexcept { rows_.clear(), distances_.clear(); }
+  /// @param distance in metres
+  /// @param gradient dof numbers [m per rad or m]
+  void add(Eigen::Index row, double distance, const VectorXd& gradient);
+  [[nodiscard]] Eigen::Index size() const noexcept {
+    return static_cast<Eigen::Index>(rows_.size());
+  }
+  [[nodiscard]] Eigen::Index row(Eigen::Index i) const { return rows_[index(i)]; }
+  [[nodiscard]] double distance(Eigen::Index i) const { return distances_[index(i)]; }
+  [[nodiscard]] auto gradient(Eigen::Index i) const { return gradients_.col(i); }
+
+ private:
+  static std::size_t index(Eigen::Index i) noexcept { return static_cast<std::size_t>(i); }
+  std::vector<Eigen::Index> rows_;
+  std::vector<double> distances_;
+  MatrixXd gradients_;  ///< dof × at least size()
+};
+
 /// Distances of the arm from what it must not touch, as functions of the configuration.
 class Clearance {
  public:
   virtual ~Clearance() = default;
-  /// How many distances evaluate() gives, always the same.
+  /// How many distances there are, always the same.
   [[nodiscard]] virtual Eigen::Index rows() const = 0;
+  /// The bounds of the distances from above [m], rows() numbers: farther away nothing is looked
+  /// for.
+  [[nodiscard]] virtual const VectorXd& far() const = 0;
   /// @param q dof numbers
-  /// @param distances in metres, rows() numbers, bounded from above
+  /// @param near is cleared before
+  virtual void evaluate(const VectorXd& q, NearDistances& near) = 0;
+  /// All distances. @param distances rows() numbers [m]
   /// @param gradients dof × rows() [m per rad or m]; zero where a distance is at its bound
-  virtual void evaluate(const VectorXd& q, VectorXd& distances, MatrixXd& gradients) = 0;
+  void evaluate_all(const VectorXd& q, VectorXd& distances, MatrixXd& gradients);
 };
 
 /// Numbers of intervals that a Problem may have.

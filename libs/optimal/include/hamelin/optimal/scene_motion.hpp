@@ -24,6 +24,8 @@ struct SceneMotionOptions {
   /// feedback of an arm that follows it. None: all of the velocities, and 0.9 of the torques.
   std::optional<double> limit_share;
   SolveOptions solve{};
+  /// Objective::time: share of the time that may be left to gain, see SolveOptions::cost_tolerance.
+  double time_tolerance = 5e-3;
 };
 
 /// The motion to one goal, at rest at both ends but for the start of the scene.

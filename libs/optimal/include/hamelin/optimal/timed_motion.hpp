@@ -51,7 +51,7 @@ struct MotionProof {
 struct ProofOptions {
   double margin_m = 0.0;  ///< least clearance, less than the influence of the view
   double begin_s = 0.0;   ///< time at which the motion begins, for obstacles that move
-  double piece_s = 1e-3;  ///< length of a piece, positive
+  double piece_s = 4e-3;  ///< length of a piece, positive
 };
 
 /// Proves that the arm keeps the margin along a motion, in pieces of at most `piece_s` that are

@@ -15,21 +15,23 @@ class WorldClearance final : public Clearance {
   /// @param view says up to which distance; both must outlive this
   WorldClearance(const model::Model& model, control::WorldView& view);
   [[nodiscard]] Eigen::Index rows() const override { return rows_; }
-  void evaluate(const VectorXd& q, VectorXd& distances, MatrixXd& gradients) override;
+  [[nodiscard]] const VectorXd& far() const override { return far_; }
+  void evaluate(const VectorXd& q, NearDistances& near) override;
 
  private:
-  void add_contacts(const VectorXd& q, VectorXd& distances, MatrixXd& gradients);
-  void add_pairs(const VectorXd& q, VectorXd& distances, MatrixXd& gradients);
+  void add_contacts(const VectorXd& q, NearDistances& near);
+  void add_pairs(const VectorXd& q, NearDistances& near);
 
   static constexpr Eigen::Index points_per_shape = 2;
   const model::Model& model_;
   control::WorldView& view_;
   Eigen::Index shapes_, pairs_, rows_;
+  VectorXd far_;
   dynamics::Workspace ws_;
   std::vector<scene::Contact> contacts_;
   std::vector<scene::SelfContact> pair_contacts_;
   std::vector<Eigen::Index> found_;  ///< points of each shape
-  VectorXd row_;
+  VectorXd gradient_, second_;
 };
 
 }  // namespace hamelin::optimal
