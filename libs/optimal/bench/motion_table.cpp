@@ -48,6 +48,8 @@ struct Case {
 Row by_splines(const Case& c, Solver solver) {
   SolveOptions options;
   options.solver = solver;
+  if (c.problem.objective == Objective::time)
+    options.cost_tolerance = SceneMotionOptions{}.time_tolerance;
   Row row;
   const double since = cpu_s();
   const Optimized found = optimize(c.problem, c.points, c.view, options);

@@ -25,12 +25,11 @@ constexpr long places_per_check = 8;
 PathTiming::PathTiming(const scene::Scene& scene, const model::Model& model,
                        const scene::SelfField* self, const MotionBounds& bounds,
                        const search::Settings& settings)
-    : limits_(motion_limits(scene, model, bounds)),
-      stop_acceleration_(bounds.changes.acceleration_max),
+    : stop_acceleration_(bounds.changes.acceleration_max),
       levers_(model, self),
       blending_(levers_),
-      way_points_(model, levers_, limits_, settings.q_lower, settings.q_upper),
-      law_(model, limits_),
+      law_(model, motion_limits(scene, model, bounds)),
+      way_points_(model, levers_, law_.limits(), settings.q_lower, settings.q_upper),
       certifier_(model, levers_, modelled_limits(scene, model.robot()),
                  enough_margin_m(bounds.reserve)),
       seed_(settings.seed) {
@@ -61,7 +60,7 @@ std::unique_ptr<CertifiedPath> PathTiming::make(search::Query& query) {
   auto out = std::make_unique<CertifiedPath>();
   out->motion.curve = best_->curve();
   if (!law_.solve(out->motion)) return nullptr;
-  out->limits = limits_;
+  out->limits = law_.limits();
   checks_ += law_.evaluated() / places_per_check;
   certifier_.certify(*out, *margins_, query);
   out->stop_acceleration = stop_acceleration_;

@@ -41,12 +41,11 @@ class PathTiming {
   [[nodiscard]] long checks() const noexcept { return checks_; }
 
  private:
-  timing::Limits limits_;
   Eigen::VectorXd stop_acceleration_;
   scene::Levers levers_;
   timing::Blending blending_;
-  timing::WayPoints way_points_;
   timing::TimeLaw law_;
+  timing::WayPoints way_points_;
   PathCertifier certifier_;
   timing::WayPoints::Effort effort_;
   std::uint64_t seed_;

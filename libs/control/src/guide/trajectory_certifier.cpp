@@ -28,10 +28,9 @@ constexpr double wanted_margin_m = 0.02;
 
 TrajectoryCertifier::TrajectoryCertifier(const scene::Scene& scene, const model::Model& model,
                                          const scene::SelfField* self, const MotionBounds& bounds)
-    : limits_(motion_limits(scene, model, bounds)),
-      stop_acceleration_(bounds.changes.acceleration_max),
+    : stop_acceleration_(bounds.changes.acceleration_max),
       enough_m_(std::max(wanted_margin_m, enough_margin_m(bounds.reserve))),
-      law_(model, limits_, {1, nodes_spacing_s}),
+      law_(model, motion_limits(scene, model, bounds), {1, nodes_spacing_s}),
       levers_(model, self),
       edges_(model, self),
       certifier_(model, levers_, modelled_limits(scene, model.robot()), enough_m_) {
@@ -45,13 +44,13 @@ TrajectoryCertifier::Result TrajectoryCertifier::certify(const scene::JointTraje
     out.cause = std::move(cause);
     return std::move(out);
   };
-  if (limits_.have_rates()) return fail("rates of torque or acceleration are bounded");
+  if (law_.limits().have_rates()) return fail("rates of torque or acceleration are bounded");
   if (std::max(trajectory.v.leftCols<1>().cwiseAbs().maxCoeff(),
                trajectory.v.rightCols<1>().cwiseAbs().maxCoeff()) > rests_below)
     return fail("it begins or ends in motion");
   auto path = std::make_unique<CertifiedPath>();
   path->motion.curve = timing::Curve(trajectory);
-  path->limits = limits_;
+  path->limits = law_.limits();
   path->stop_acceleration = stop_acceleration_;
   path->standing = world.standing;
   if (!law_.slow_down(path->motion)) return fail(std::string(law_.cause()));

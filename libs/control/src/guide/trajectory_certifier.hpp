@@ -34,7 +34,6 @@ class TrajectoryCertifier {
   [[nodiscard]] Eigen::Index set_margins(CertifiedPath& path);
   [[nodiscard]] bool keeps(double of_obstacles_m, double of_self_m);
 
-  timing::Limits limits_;
   Eigen::VectorXd stop_acceleration_;
   double enough_m_;
   timing::TimeLaw law_;
