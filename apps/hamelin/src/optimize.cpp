@@ -26,19 +26,19 @@ struct OptimizeOptions {
   bool json = false;
 };
 
-std::string goal_text(const optimal::GoalMotion& goal, std::size_t index) {
+std::string goal_text(const optimal::GoalMotion& goal, std::size_t index, bool exact) {
   const optimal::Optimized& f = goal.found;
   const optimal::Solution& s = f.solution;
   const std::string name = fmt::format("goal {}", index + 1);
   const bool optimal = goal.valid() && s.converged;
-  const char* const state = optimal        ? "optimal"
+  const std::string state = optimal        ? exact ? "optimal" : "nearly optimal"
                             : goal.valid() ? "valid, not proved optimal"
                                            : "no motion";
   std::string text = fmt::format("{:<12}{} after {} iterations: {:.6g} s, cost {:.6g}\n", name,
                                  coloured(state, optimal        ? Colour::good
                                                  : goal.valid() ? Colour::fair
                                                                 : Colour::bad),
-                                 s.iterations, f.motion.duration_s(), s.cost);
+                                 f.iterations, f.motion.duration_s(), s.cost);
   if (const std::string cause = optimal::cause_of(s); !cause.empty())
     text += fmt::format("{:<12}{}\n", "", cause);
   if (goal.valid())
@@ -87,7 +87,9 @@ int optimize(OptimizeOptions options) {
     print_json(optimal::to_json(motion, options.motion, options.rate_hz));
   } else {
     std::string text;
-    for (std::size_t i = 0; i < motion.goals.size(); ++i) text += goal_text(motion.goals[i], i);
+    const bool exact = options.motion.solve.solver == optimal::Solver::ipopt;
+    for (std::size_t i = 0; i < motion.goals.size(); ++i)
+      text += goal_text(motion.goals[i], i, exact);
     report(text);
   }
   return motion.valid() ? 0 : 1;

@@ -46,10 +46,10 @@ struct Case {
 };
 
 Row by_splines(const Case& c, Solver solver) {
-  SolveOptions options;
-  options.solver = solver;
-  if (c.problem.objective == Objective::time)
-    options.cost_tolerance = SceneMotionOptions{}.time_tolerance;
+  SceneMotionOptions wanted;
+  wanted.objective = c.problem.objective;
+  wanted.solve.solver = solver;
+  const SolveOptions options = solve_options(wanted);
   Row row;
   const double since = cpu_s();
   const Optimized found = optimize(c.problem, c.points, c.view, options);

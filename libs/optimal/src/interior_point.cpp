@@ -143,13 +143,15 @@ InteriorPoint::Errors InteriorPoint::errors(double mu) {
 
 // docs/theory.md (18.20)
 bool InteriorPoint::cheap_enough(const Errors& now) const {
-  if (!(options_.cost_tolerance > 0.0) || !(now.violation <= options_.violation_max()))
+  const double cost = program_.cost(), small = options_.cost_tolerance * std::abs(cost);
+  if (!(small > 0.0) || !(now.violation <= options_.violation_max) ||
+      !(std::abs(cost_before_ - cost) <= small))
     return false;
   double gap = 0.0;
   for_each_side([&](const Side& side) {
     for (const Index r : side.rows) gap += side.slack[r] * side.multiplier[r];
   });
-  return gap <= options_.cost_tolerance * scale_ * std::abs(program_.cost());
+  return gap <= scale_ * small;
 }
 
 // docs/theory.md (18.12). Where distances have kinks, stationarity may stay large although cost and
@@ -278,6 +280,7 @@ bool InteriorPoint::take_step() {
   const VectorXd x = x_;
   const VectorXd slack_l = lower_.slack, slack_u = upper_.slack;
   const double slope = barrier_slope();
+  cost_before_ = program_.cost();
   const Filter::Point before = filter_point();
   merit_.begin(before, slope);
   double step = std::min(largest_step(lower_, lower_.slack, lower_.slack_step),

@@ -90,8 +90,9 @@ class InteriorPoint {
   /// Of the rows behind the steady ones, which have lower bounds: whether they do not rest. Where
   /// nothing is near, they are constant and rest, each with its slack.
   std::vector<bool> awake_;
-  double resting_log_ = 0.0;  ///< Σ log(slack) of those that rest
-  double scale_ = 1.0;        ///< of the cost
+  double resting_log_ = 0.0;       ///< Σ log(slack) of those that rest
+  double scale_ = 1.0;             ///< of the cost
+  double cost_before_ = infinity;  ///< of the last step
   Filter filter_;
   Merit merit_;
   double first_violation_ = 1.0;  ///< at the guess, at least 1

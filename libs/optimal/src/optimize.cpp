@@ -152,7 +152,7 @@ class Refinement {
     Optimized out;
     out.solution = solve(problem_, guess_, options_);
     out.iterations = out.solution.iterations;
-    solved_ = out.solution.violation <= options_.violation_max();
+    solved_ = out.solution.violation <= options_.violation_max;
     out.motion = {out.solution.step_s, out.solution.control};
     out.clearance_points = problem_.clearance_points;
     if (!out.motion.well_formed()) return out;

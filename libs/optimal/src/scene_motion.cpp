@@ -92,6 +92,17 @@ double slow_duration(const MatrixXd& points, const VectorXd& velocity) {
   return duration;
 }
 
+SolveOptions solve_options(const SceneMotionOptions& options) {
+  // the estimate of what is left to gain is far worse for efforts
+  constexpr double of_time = 5e-3, of_effort = 1e-4, small_violation = 1e-3;
+  const bool time = options.objective == Objective::time;
+  SolveOptions out = options.solve;
+  out.cost_tolerance = options.cost_tolerance.value_or(time ? of_time : of_effort);
+  if (time && out.cost_tolerance > 0.0)
+    out.violation_max = std::max(out.violation_max, small_violation);
+  return out;
+}
+
 Problem problem_of(const scene::Scene& scene, const SceneMotionOptions& options,
                    const model::Model& model) {
   Problem problem;
@@ -157,9 +168,7 @@ SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& 
   Problem problem = problem_of(scene, options, model);
   const VectorXd q_lower = problem.limits.position_min, q_upper = problem.limits.position_max;
   problem.v_goal = rest;
-  SolveOptions solve = options.solve;
-  if (options.objective == Objective::time)
-    solve.cost_tolerance = std::max(solve.cost_tolerance, options.time_tolerance);
+  const SolveOptions solve = solve_options(options);
   for (std::size_t i = 0; i < scene.goals.size(); ++i) {
     const MatrixXd points = way_points(scene.goals[i], q, i < paths.size() ? &paths[i] : nullptr);
     problem.q_start = q;

@@ -31,6 +31,12 @@ void check_options(const SolveOptions& options) {
   if (!(options.tolerance > 0.0 && options.tolerance < 1.0))
     refuse(fmt::format("a tolerance of {} given, expected a number between 0 and 1",
                        options.tolerance));
+  if (!(options.cost_tolerance >= 0.0 && options.cost_tolerance < 1.0))
+    refuse(fmt::format("a tolerance of the cost of {} given, expected a number from 0 to 1",
+                       options.cost_tolerance));
+  if (!(options.violation_max >= 0.0 && options.violation_max < 1.0))
+    refuse(fmt::format("a violation of {} that counts as none given, expected a number from 0 to 1",
+                       options.violation_max));
   if (options.iterations_max < 0)
     refuse(fmt::format("{} iterations given, expected 0 or more", options.iterations_max));
 }
@@ -83,12 +89,12 @@ Solution solve_banded(Transcription& program, const VectorXd& guess, const Solve
     iterations += found.iterations;
     found.violation = program.violation();
     if (&start == &starts.front() ||
-        better(found.violation, program.cost(), best.violation, cost, options.violation_max())) {
+        better(found.violation, program.cost(), best.violation, cost, options.violation_max)) {
       best = std::move(found);
       x = solver.x();
       cost = program.cost();
     }
-    if (best.violation <= options.violation_max() || (options.stop && options.stop())) break;
+    if (best.violation <= options.violation_max || (options.stop && options.stop())) break;
   }
   (void)program.evaluate(x);
   best.iterations = iterations;
@@ -115,7 +121,7 @@ Solution solve(const Problem& problem, const MatrixXd& guess, const SolveOptions
                      ? solve_with_ipopt(program, x, options)
                      : solve_banded(program, x, options, problem.clearance != nullptr);
   out.violation = program.violation(&out.violated);
-  if (out.violation <= options.violation_max()) {
+  if (out.violation <= options.violation_max) {
     out.violated.clear();
   } else if (out.converged) {
     out.converged = false;

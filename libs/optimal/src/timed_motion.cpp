@@ -56,7 +56,7 @@ void torque_at(const model::Model& model, dynamics::Workspace& ws, const TimedMo
 
 namespace {
 
-constexpr int bisections_max = 6;            // of a piece
+constexpr int bisections_max = 8;            // of a piece
 constexpr double bound_resolution_m = 1e-5;  // of bounds below the margin
 
 // Proves the pieces of a motion in the order of time, docs/theory.md (18.18). Places are times in

@@ -100,9 +100,9 @@ TEST_CASE("least time to within a share of it takes fewer iterations", "[optimal
   SceneMotionOptions options;
   options.objective = Objective::time;
   options.margin_m = GENERATE(0.002, 0.008);
-  options.time_tolerance = 0.0;
+  options.cost_tolerance = 0.0;
   const SceneMotion exact = optimize_scene(scene, options);
-  options.time_tolerance = 5e-3;
+  options.cost_tolerance = 5e-3;
   const SceneMotion near = optimize_scene(scene, options);
   REQUIRE(exact.valid());
   REQUIRE(near.valid());

@@ -24,9 +24,14 @@ struct SceneMotionOptions {
   /// feedback of an arm that follows it. None: all of the velocities, and 0.9 of the torques.
   std::optional<double> limit_share;
   SolveOptions solve{};
-  /// Objective::time: share of the time that may be left to gain, see SolveOptions::cost_tolerance.
-  double time_tolerance = 5e-3;
+  /// About the share of the cost that may be left to gain, see SolveOptions; none: 0.005 of the
+  /// least time, or 1e-4 of the least effort.
+  std::optional<double> cost_tolerance;
 };
+
+/// With the tolerances of the options: where time is free, small violations are met by slowing
+/// down.
+[[nodiscard]] SolveOptions solve_options(const SceneMotionOptions& options);
 
 /// The motion to one goal, at rest at both ends but for the start of the scene.
 struct GoalMotion {

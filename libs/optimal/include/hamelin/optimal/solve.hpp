@@ -1,5 +1,4 @@
 #pragma once
-#include <algorithm>
 #include <functional>
 #include <string>
 
@@ -22,12 +21,10 @@ struct SolveOptions {
   /// On stationarity, violation of bounds as shares of them, and complementarity; positive.
   double tolerance = 1e-8;
   /// Solver::banded also ends where about this share of the cost may be left to gain, and bounds
-  /// are violated by no more than violation_max(); zero: never.
+  /// are violated by no more than violation_max; zero: never.
   double cost_tolerance = 0.0;
   /// Violation that counts as none, as a share of the bounds, or in decimetres of clearance.
-  [[nodiscard]] double violation_max() const noexcept {
-    return cost_tolerance > 0.0 ? std::max(tolerance, 1e-3) : tolerance;
-  }
+  double violation_max = 1e-8;
   /// Whether the guess is the solution of a similar problem. Used by Solver::banded.
   bool near_solution = false;
   /// Asked before each iteration; true ends the solution. Optional.
