@@ -1,0 +1,260 @@
+#include "hamelin/sensing/occupancy_grid.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/isa_kernels.hpp"
+#include "hamelin/sensing/kernel/ray_walk.hpp"
+#include "ray.hpp"
+
+namespace hamelin::sensing {
+
+namespace kernel {
+HAMELIN_SELECT_KERNELS(WalkKernels, walk_kernels)
+}  // namespace kernel
+
+namespace {
+
+constexpr std::int64_t voxels_max = std::int64_t{1} << 32;
+
+[[noreturn]] void refuse(const std::string& what) {
+  throw Error(ErrorCode::invalid, "occupancy grid: " + what);
+}
+
+float log_odds_of(const char* name, double p) {
+  if (!(p > 0.0 && p < 1.0))
+    refuse(
+        fmt::format("a probability `{}` of {} given, expected a number between 0 and 1", name, p));
+  return static_cast<float>(std::log(p / (1.0 - p)));
+}
+
+}  // namespace
+
+// The log-odds of voxels, as many along y and z as fit a page or two; x is a row of bits.
+struct OccupancyGrid::Block {
+  static constexpr std::int32_t edge = 8, row = 64;
+  std::array<float, static_cast<std::size_t>(edge* edge* row)> values;
+  Block() { values.fill(std::numeric_limits<float>::quiet_NaN()); }
+  float* at(std::int32_t y, std::int32_t z) {
+    return values.data() + (z % edge * edge + y % edge) * row;
+  }
+};
+
+// The voxels of a frame's points, each once, in the order of the points: a table with open
+// addresses.
+class OccupancyGrid::EndPoints {
+ public:
+  void begin(std::size_t points) {
+    const std::size_t size = std::bit_ceil(std::max<std::size_t>(64, 2 * points));
+    if (slots_.size() < size) slots_.resize(size);
+    std::fill(slots_.begin(), slots_.end(), empty);
+  }
+  /// @return whether it is new
+  bool add(const Voxel& voxel) {
+    const auto part = [&](std::size_t i) {
+      return static_cast<std::uint64_t>(static_cast<std::uint32_t>(voxel[i] + key_limit));
+    };
+    const std::uint64_t key = part(0) | part(1) << 16U | part(2) << 32U;
+    constexpr std::uint64_t golden = 0x9e3779b97f4a7c15;
+    std::size_t i = static_cast<std::size_t>((key * golden) >> 20U) & (slots_.size() - 1);
+    for (; slots_[i] != empty; i = (i + 1) & (slots_.size() - 1))
+      if (slots_[i] == key) return false;
+    slots_[i] = key;
+    return true;
+  }
+
+ private:
+  static constexpr std::uint64_t empty = ~std::uint64_t{0};
+  std::vector<std::uint64_t> slots_;
+};
+
+OccupancyGrid::OccupancyGrid(double resolution_m, const scene::VoxelBox& box,
+                             const SensorModel& model)
+    : resolution_(resolution_m),
+      box_(box),
+      model_{log_odds_of("hit", model.hit), log_odds_of("miss", model.miss),
+             log_odds_of("least", model.least), log_odds_of("most", model.most),
+             log_odds_of("occupied", model.occupied)},
+      ends_(std::make_unique<EndPoints>()) {
+  if (!(resolution_m > 0.0) || !std::isfinite(resolution_m))
+    refuse(fmt::format("a resolution of {} m given, expected a positive number", resolution_m));
+  if (!(model.miss <= 0.5 && model.hit >= 0.5 && model.least <= model.occupied &&
+        model.occupied <= model.most))
+    refuse("expected miss ≤ 0.5 ≤ hit and least ≤ occupied ≤ most");
+  std::array<std::int64_t, 3> size{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    size[i] = std::int64_t{box.hi[i]} - box.lo[i];
+    if (size[i] < 1 || box.lo[i] < -key_limit || box.hi[i] > key_limit)
+      refuse(fmt::format("voxels {} to {} along an axis given, expected some within {} to {}",
+                         box.lo[i], box.hi[i], -key_limit, key_limit));
+  }
+  words_ = static_cast<std::int32_t>((size[0] + 63) / 64);
+  if (size[1] * size[2] > voxels_max / (64 * words_))
+    refuse(fmt::format("{} × {} × {} voxels given, expected at most {}", size[0], size[1], size[2],
+                       voxels_max));
+  stride_ = {1, 64 * std::int64_t{words_}, 64 * words_ * size[1]};
+  const auto words = static_cast<std::size_t>(words_ * size[1] * size[2]);
+  for (Bits* bits : {&known_, &occupied_, &passed_, &hit_}) bits->words.assign(words, 0);
+  const auto blocks = [](std::int64_t n) {
+    return static_cast<std::size_t>((n + Block::edge - 1) / Block::edge);
+  };
+  block_count_ = {static_cast<std::size_t>(words_), blocks(size[1]), blocks(size[2])};
+  blocks_.resize(block_count_[0] * block_count_[1] * block_count_[2]);
+}
+
+OccupancyGrid::~OccupancyGrid() = default;
+OccupancyGrid::OccupancyGrid(OccupancyGrid&&) noexcept = default;
+OccupancyGrid& OccupancyGrid::operator=(OccupancyGrid&&) noexcept = default;
+
+bool OccupancyGrid::contains(const Voxel& voxel) const noexcept {
+  for (std::size_t i = 0; i < 3; ++i)
+    if (voxel[i] < box_.lo[i] || voxel[i] >= box_.hi[i]) return false;
+  return true;
+}
+
+std::int64_t OccupancyGrid::bit_of(const Voxel& voxel) const noexcept {
+  std::int64_t bit = 0;
+  for (std::size_t i = 0; i < 3; ++i) bit += stride_[i] * (voxel[i] - box_.lo[i]);
+  return bit;
+}
+
+OccupancyGrid::Voxel OccupancyGrid::first_of(std::size_t word) const noexcept {
+  const auto row = static_cast<std::int32_t>(word / static_cast<std::size_t>(words_)),
+             rows = box_.hi[1] - box_.lo[1];
+  return {box_.lo[0] + 64 * static_cast<std::int32_t>(word % static_cast<std::size_t>(words_)),
+          box_.lo[1] + row % rows, box_.lo[2] + row / rows};
+}
+
+std::size_t OccupancyGrid::block_of(const Voxel& first) const noexcept {
+  const auto at = [&](std::size_t i, std::int32_t edge) {
+    return static_cast<std::size_t>((first[i] - box_.lo[i]) / edge);
+  };
+  return (at(2, Block::edge) * block_count_[1] + at(1, Block::edge)) * block_count_[0] +
+         at(0, Block::row);
+}
+
+void OccupancyGrid::free_along(const Eigen::Vector3f& origin, const Eigen::Vector3f& end) {
+  Ray ray(origin, end, resolution_);
+  while (!ray.done() && !contains(ray.voxel())) ray.advance();
+  if (ray.done()) return;
+  kernel::BoxRay out{ray.next(), ray.apart(), ray.length(), bit_of(ray.voxel()), {}, 0, {}, {}};
+  std::array<std::int64_t, 3> way{}, step{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    step[i] = ray.step(i);
+    way[i] = ray.end()[i] - ray.voxel()[i];
+    out.bit_step[i] = stride_[i] * step[i];
+    // a ray that has left the box does not return
+    out.left[i] = step[i] > 0 ? box_.hi[i] - ray.voxel()[i] : ray.voxel()[i] - box_.lo[i] + 1;
+  }
+  out.way = kernel::BoxRay::packed(way[0], way[1], way[2]);
+  out.way_step = {kernel::BoxRay::packed(step[0], 0, 0), kernel::BoxRay::packed(0, step[1], 0),
+                  kernel::BoxRay::packed(0, 0, step[2])};
+  rays_.push_back(out);
+}
+
+void OccupancyGrid::mark(const Eigen::Ref<const Eigen::Matrix3Xf>& points,
+                         const Eigen::Vector3f& origin, double range_m) {
+  const double voxels_per_m = 1.0 / resolution_;
+  ends_->begin(static_cast<std::size_t>(points.cols()));
+  rays_.clear();
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const Eigen::Vector3f point = points.col(i);
+    if (!has_key(point, voxels_per_m)) continue;
+    Voxel voxel;
+    Eigen::Vector3f centre;
+    for (int j = 0; j < 3; ++j) {
+      voxel[static_cast<std::size_t>(j)] = voxel_at(static_cast<double>(point[j]), voxels_per_m);
+      centre[j] = static_cast<float>(centre_of(voxel[static_cast<std::size_t>(j)], resolution_));
+    }
+    if (!ends_->add(voxel)) continue;
+    const Eigen::Vector3f way = centre - origin;
+    const float squared = way[0] * way[0] + way[1] * way[1] + way[2] * way[2];
+    const double distance = std::sqrt(static_cast<double>(squared));
+    if (distance <= range_m) {
+      free_along(origin, centre);
+      if (contains(voxel)) hit_.set(bit_of(voxel));
+    } else {
+      const Eigen::Vector3f end =
+          origin + way / static_cast<float>(distance) * static_cast<float>(range_m);
+      if (has_key(end, voxels_per_m)) free_along(origin, end);
+    }
+  }
+  kernel::select_walk_kernels(default_isa()).walk(rays_.data(), rays_.size(), passed_.words.data());
+}
+
+std::uint64_t OccupancyGrid::update(std::size_t word, std::uint64_t free, std::uint64_t occupied) {
+  const Voxel first = first_of(word);
+  std::unique_ptr<Block>& block = blocks_[block_of(first)];
+  if (!block) block = std::make_unique<Block>();
+  float* const values = block->at(first[1] - box_.lo[1], first[2] - box_.lo[2]);
+  std::uint64_t now = occupied_.words[word];
+  for (std::uint64_t left = free | occupied; left != 0; left &= left - 1) {
+    const int i = std::countr_zero(left);
+    const std::uint64_t bit = std::uint64_t{1} << i;
+    float& value = values[i];
+    const float before = std::isnan(value) ? 0.0F : value;
+    value = std::clamp(before + ((occupied & bit) != 0 ? model_.hit : model_.miss), model_.least,
+                       model_.most);
+    now = value >= model_.occupied ? now | bit : now & ~bit;
+  }
+  return now;
+}
+
+// docs/theory.md (20.1). A voxel that a point is in is not freed by the rays to others.
+void OccupancyGrid::apply() {
+  rows_.clear();
+  for (std::size_t word = 0; word < passed_.words.size(); ++word) {
+    const std::uint64_t hit = hit_.words[word], passed = passed_.words[word] & ~hit;
+    if ((hit | passed) == 0) continue;
+    hit_.words[word] = passed_.words[word] = 0;
+    const std::uint64_t known = known_.words[word], before = occupied_.words[word],
+                        now = update(word, passed, hit), learned = (hit | passed) & ~known;
+    known_.words[word] = known | learned;
+    occupied_.words[word] = now;
+    const Row row{first_of(word), now & ~before, (before | learned) & ~now, learned};
+    if ((row.occupied | row.freed) != 0) rows_.push_back(row);
+  }
+}
+
+std::span<const OccupancyGrid::Row> OccupancyGrid::insert(
+    const Eigen::Ref<const Eigen::Matrix3Xf>& points, const Eigen::Vector3f& origin,
+    double range_m) {
+  if (!origin.allFinite() || !has_key(origin, 1.0 / resolution_))
+    refuse(fmt::format("points seen from ({}, {}, {}) given, expected a place within {} voxels",
+                       origin[0], origin[1], origin[2], key_limit));
+  if (!points.allFinite()) refuse("a point is not finite, expected finite numbers");
+  if (!(range_m > 0.0)) refuse(fmt::format("a range of {} m given, expected more than 0", range_m));
+  mark(points, origin, range_m);
+  apply();
+  return rows_;
+}
+
+OccupancyGrid::State OccupancyGrid::state(const Voxel& voxel) const {
+  if (!contains(voxel)) return State::unknown;
+  const auto bit = static_cast<std::size_t>(bit_of(voxel));
+  const auto has = [&](const Bits& bits) { return (bits.words[bit / 64] >> (bit % 64) & 1U) != 0; };
+  return !has(known_) ? State::unknown : has(occupied_) ? State::occupied : State::free;
+}
+
+float OccupancyGrid::log_odds(const Voxel& voxel) const {
+  constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+  if (!contains(voxel)) return unknown;
+  const auto bit = static_cast<std::size_t>(bit_of(voxel));
+  const Voxel first = first_of(bit / 64);
+  Block* const block = blocks_[block_of(first)].get();
+  return block == nullptr ? unknown
+                          : block->at(first[1] - box_.lo[1], first[2] - box_.lo[2])[bit % 64];
+}
+
+std::size_t OccupancyGrid::bytes() const noexcept {
+  std::size_t sum = 4 * known_.words.size() * sizeof(std::uint64_t);
+  for (const auto& block : blocks_)
+    if (block) sum += sizeof(Block);
+  return sum;
+}
+
+}  // namespace hamelin::sensing
