@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "hamelin/sensing/occupancy_grid.hpp"
+#include "hamelin/sensing/self_filter.hpp"
 
 using namespace hamelin;
 
@@ -34,6 +35,13 @@ TEST_CASE("frames of 76 800 points", "[sensing][bench]") {
   sensing::OccupancyGrid grid(0.01, {{-120, -120, -120}, {130, 120, 120}});
   BENCHMARK("grid of 1 cm") {
     return grid.insert(points, origin).size();
+  };
+  std::vector<Eigen::Vector3d> centers;
+  for (int i = 0; i < 60; ++i) centers.emplace_back(0.01 * i, 0.1 * std::sin(0.3 * i), 0.02 * i);
+  const std::vector<double> radii(centers.size(), 0.08);
+  BENCHMARK("self-filter, 60 spheres") {
+    Eigen::Matrix3Xf rest = points;
+    return sensing::remove_arm({centers, radii}, 0.02, rest);
   };
   octomap::Pointcloud cloud;
   for (Eigen::Index i = 0; i < points.cols(); ++i)
