@@ -18,6 +18,7 @@ void add_serve(CLI::App& app, int& exit_code);
 void add_plant(CLI::App& app, int& exit_code);
 void add_robot(CLI::App& app, int& exit_code);
 void add_scene(CLI::App& app, int& exit_code);
+void add_map(CLI::App& app, int& exit_code);
 void add_sweep(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
 void add_plugins(CLI::App& app, int& exit_code);

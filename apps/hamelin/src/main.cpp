@@ -26,7 +26,7 @@ const std::vector<CommandGroup>& command_groups() {
       {"Run",
        {add_run, add_plan, add_optimize, add_integrate, add_accuracy, add_replay, add_sweep,
         add_bench, add_serve, add_plant}},
-      {"Inspect", {add_report, add_explain, add_robot, add_scene, add_plugins}},
+      {"Inspect", {add_report, add_explain, add_robot, add_scene, add_map, add_plugins}},
       {"Files", {add_export, add_validate, add_schema}},
       {"Help", {add_help, add_completion}},
       {"", {add_man}},

@@ -221,7 +221,7 @@ PointFile read_pcd(Text& text) {
     } else if (key == "POINTS") {
       records.count = text.count(1);
     } else if (key == "VIEWPOINT") {
-      viewpoint = text.pose();
+      viewpoint = text.pose(1);
     } else if (key == "DATA") {
       const std::string_view data = text.word(1);
       records.ascii = data == "ascii";
@@ -358,6 +358,18 @@ PointFile read_points(const std::filesystem::path& file) {
                                               ".txt or .csv",
                                               file.string(), file.extension().string()));
   return points_from_bytes(read_file(file), *format, file.string());
+}
+
+std::vector<geometry::SE3> poses_from_text(std::string_view bytes, const std::string& where) {
+  Text text(bytes, where);
+  std::vector<geometry::SE3> out;
+  while (text.next())
+    if (!text.is_comment()) out.push_back(text.pose(0));
+  return out;
+}
+
+std::vector<geometry::SE3> read_poses(const std::filesystem::path& file) {
+  return poses_from_text(read_file(file), file.string());
 }
 
 }  // namespace hamelin::sensing

@@ -64,11 +64,11 @@ void Text::numbers(std::vector<double>& out) const {
   }
 }
 
-geometry::SE3 Text::pose() const {
+geometry::SE3 Text::pose(std::size_t first) const {
   std::vector<double> given;
   Text rest = *this;
-  const std::string_view key = word(0);
-  rest.line_ = line_.substr(static_cast<std::size_t>(key.data() - line_.data()) + key.size());
+  if (const std::string_view word = this->word(first); !word.empty())
+    rest.line_ = line_.substr(static_cast<std::size_t>(word.data() - line_.data()));
   rest.numbers(given);
   const auto bad = [](double x) { return !std::isfinite(x); };
   if (given.size() != 7 || std::any_of(given.begin(), given.end(), bad))

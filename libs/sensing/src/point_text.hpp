@@ -27,8 +27,8 @@ class Text {
   [[nodiscard]] std::size_t count(std::size_t i) const;
   /// All numbers of the line. @throws Error parse for what is none
   void numbers(std::vector<double>& out) const;
-  /// The words 1 to 7 as position and quaternion w, x, y, z. @throws Error parse
-  [[nodiscard]] geometry::SE3 pose() const;
+  /// The seven words from `first` on as position and quaternion w, x, y, z. @throws Error parse
+  [[nodiscard]] geometry::SE3 pose(std::size_t first) const;
   /// Whether the line is empty or begins with #.
   [[nodiscard]] bool is_comment() const;
   /// @throws Error parse, with the file and the line

@@ -154,6 +154,22 @@ TEST_CASE("files that are damaged are refused in one line", "[sensing][unit]") {
              Contains("a.las: ends in '.las'"));
 }
 
+TEST_CASE("poses of a sensor are read line by line", "[sensing][unit]") {
+  const auto poses =
+      sensing::poses_from_text("# x y z qw qx qy qz\n0 0 1 1 0 0 0\n\n1,2,3,0,0,0,1\n", "p");
+  REQUIRE(poses.size() == 2);
+  CHECK(poses[0].p() == Eigen::Vector3d(0.0, 0.0, 1.0));
+  CHECK((poses[1] * Eigen::Vector3d(1.0, 0.0, 0.0) - Eigen::Vector3d(0.0, 2.0, 3.0)).norm() <
+        1e-12);
+  const auto message = [](const std::string& text) {
+    return test::error_of([&] { (void)sensing::poses_from_text(text, "p"); });
+  };
+  CHECK_THAT(message("0 0 1 1 0 0 0\n0 0 1\n"),
+             Contains("p: line 2: expected seven finite numbers"));
+  CHECK_THAT(message("0 0 1 2 0 0 0\n"), Contains("a quaternion of length 2, expected 1"));
+  CHECK_THAT(message("0 0 nan 1 0 0 0\n"), Contains("seven finite numbers"));
+}
+
 TEST_CASE("no damage to a file makes anything but an error or points", "[sensing][fuzz]") {
   Rng rng(4);
   const std::vector<std::pair<PointFormat, std::string>> files{

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "hamelin/geometry/se3.hpp"
 
@@ -31,5 +32,12 @@ struct PointFile {
                                           const std::string& where);
 /// The points in a file. @throws Error io, parse, or usage for an unknown ending
 [[nodiscard]] PointFile read_points(const std::filesystem::path& file);
+
+/// Poses of a sensor, one per line: seven numbers, a position [m] and a quaternion w, x, y, z,
+/// separated as in text with points.
+/// @throws Error io or parse, one line that names the line
+[[nodiscard]] std::vector<geometry::SE3> read_poses(const std::filesystem::path& file);
+[[nodiscard]] std::vector<geometry::SE3> poses_from_text(std::string_view text,
+                                                         const std::string& where);
 
 }  // namespace hamelin::sensing
