@@ -101,8 +101,7 @@ void add_optimize(CLI::App& app, int& exit_code) {
   auto* command = add_command(
       app, "optimize",
       "Find the motion of least effort or time to each goal of a scene. It keeps all limits, and "
-      "the "
-      "margin is proved. The exit code is 1 if a goal has no such motion",
+      "the margin is proved. The exit code is 1 if a goal has no such motion",
       "hamelin optimize data/scenes/shelf.json --guide rrt-connect -o shelf-motion.json\n"
       "hamelin optimize data/scenes/pillar.json --minimize time --rate 1000 --format csv "
       "-o fast.csv");

@@ -144,7 +144,7 @@ InteriorPoint::Errors InteriorPoint::errors(double mu) {
 // docs/theory.md (18.20)
 bool InteriorPoint::cheap_enough(const Errors& now) const {
   const double cost = program_.cost(), small = options_.cost_tolerance * std::abs(cost);
-  if (!(small > 0.0) || !(now.violation <= options_.violation_max) ||
+  if (!(small > 0.0) || !(now.violation <= options_.no_violation()) ||
       !(std::abs(cost_before_ - cost) <= small))
     return false;
   double gap = 0.0;

@@ -152,7 +152,7 @@ class Refinement {
     Optimized out;
     out.solution = solve(problem_, guess_, options_);
     out.iterations = out.solution.iterations;
-    solved_ = out.solution.violation <= options_.violation_max;
+    solved_ = out.solution.violation <= options_.no_violation();
     out.motion = {out.solution.step_s, out.solution.control};
     out.clearance_points = problem_.clearance_points;
     if (!out.motion.well_formed()) return out;
@@ -218,8 +218,8 @@ class Refinement {
     // without a motion at the knots, more of them help only where torques are what is violated
     if (!solved_ && first && !(coarse && asked_.objective == Objective::time)) return false;
     if (!found.proof.certified && !reserve_clearance(found.proof)) return false;
-    options_.near_solution = true;
     problem_.duration_s = found.motion.duration_s();
+    options_.near_solution = true;
     guess_ = inner_points(found.motion.control);
     if (coarse)
       add_knots(found.motion, excess);

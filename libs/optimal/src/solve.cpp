@@ -89,12 +89,12 @@ Solution solve_banded(Transcription& program, const VectorXd& guess, const Solve
     iterations += found.iterations;
     found.violation = program.violation();
     if (&start == &starts.front() ||
-        better(found.violation, program.cost(), best.violation, cost, options.violation_max)) {
+        better(found.violation, program.cost(), best.violation, cost, options.no_violation())) {
       best = std::move(found);
       x = solver.x();
       cost = program.cost();
     }
-    if (best.violation <= options.violation_max || (options.stop && options.stop())) break;
+    if (best.violation <= options.no_violation() || (options.stop && options.stop())) break;
   }
   (void)program.evaluate(x);
   best.iterations = iterations;
@@ -121,7 +121,7 @@ Solution solve(const Problem& problem, const MatrixXd& guess, const SolveOptions
                      ? solve_with_ipopt(program, x, options)
                      : solve_banded(program, x, options, problem.clearance != nullptr);
   out.violation = program.violation(&out.violated);
-  if (out.violation <= options.violation_max) {
+  if (out.violation <= options.no_violation()) {
     out.violated.clear();
   } else if (out.converged) {
     out.converged = false;

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <functional>
 #include <string>
 
@@ -23,8 +24,10 @@ struct SolveOptions {
   /// Solver::banded also ends where about this share of the cost may be left to gain, and bounds
   /// are violated by no more than violation_max; zero: never.
   double cost_tolerance = 0.0;
-  /// Violation that counts as none, as a share of the bounds, or in decimetres of clearance.
-  double violation_max = 1e-8;
+  /// Violation that counts as none where it is more than the tolerance, as a share of the bounds,
+  /// or in decimetres of clearance.
+  double violation_max = 0.0;
+  [[nodiscard]] double no_violation() const noexcept { return std::max(tolerance, violation_max); }
   /// Whether the guess is the solution of a similar problem. Used by Solver::banded.
   bool near_solution = false;
   /// Asked before each iteration; true ends the solution. Optional.
