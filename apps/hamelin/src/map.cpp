@@ -6,8 +6,8 @@
 #include "commands.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
-#include "hamelin/sensing/map_maker.hpp"
 #include "hamelin/sensing/point_file.hpp"
+#include "map_maker.hpp"
 #include "output.hpp"
 #include "terminal.hpp"
 
@@ -58,7 +58,7 @@ void from_points(const PointsOptions& options) {
     const auto given = number_list("--origin", options.origin, 3);
     place = {given[0], given[1], given[2]};
   }
-  sensing::MapMaker maker(options.resolution_m);
+  MapMaker maker(options.resolution_m);
   std::size_t points = 0, not_finite = 0;
   for (std::size_t i = 0; i < options.files.size(); ++i) {
     sensing::PointFile frame = sensing::read_points(options.files[i]);

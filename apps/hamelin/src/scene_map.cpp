@@ -95,8 +95,8 @@ scene::CropOptions crop_options(const CropFlags& flags) {
   if (flags.map) options.map = *flags.map;
   if (flags.scene) {
     const scene::Scene scene = scene::read_scene(*flags.scene);
-    if (!scene.map)
-      throw Error(ErrorCode::invalid, fmt::format("{}: /map: is missing, expected a map to crop",
+    if (!scene.map || scene.map->file.empty())
+      throw Error(ErrorCode::invalid, fmt::format("{}: /map: has no file, expected a map to crop",
                                                   flags.scene->string()));
     if (!flags.map) options.map = scene.map->file;
     options.read.scale = scene.map->scale;

@@ -50,7 +50,7 @@ std::string check_scene(const std::filesystem::path& file, bool strict) {
   std::string description = fmt::format(
       "scene, {}", check_robot(scene.robot.file,
                                {scene.robot.tip, scene.robot.spheres, scene.robot.srdf, strict}));
-  if (scene.map)
+  if (scene.map && !scene.map->file.empty())
     description += fmt::format(
         ", {}", describe_map(scene::read_map(scene.map->file,
                                              {scene.map->scale, scene.map->occupancy_threshold})));

@@ -208,6 +208,10 @@ Json to_json(const Result& r) {
   if (r.position_excess) document["position_excess"] = *r.position_excess;
   if (r.speed_excess) document["speed_excess"] = *r.speed_excess;
   if (r.shield) document["shield"] = shield(*r.shield);
+  if (r.sensors)
+    document["sensors"] = {{"frames", r.sensors->frames},     {"refused", r.sensors->refused},
+                           {"points", r.sensors->points},     {"on_arm", r.sensors->on_arm},
+                           {"occupied", r.sensors->occupied}, {"cleared", r.sensors->cleared}};
   if (r.guide)
     document["guide"] = {{"type", r.guide->type},
                          {"searches", r.guide->searches},

@@ -391,7 +391,9 @@ scene::Overrides checked_overrides(const py::dict& given) {
 std::string repr_of_scene(const BoundScene& s) {
   return fmt::format("<hamelin.Scene '{}': robot '{}', {} goals, {}, {} obstacles, planner {}>",
                      s.name, s.scene.robot.file.filename().string(), s.scene.goals.size(),
-                     s.scene.map ? s.scene.map->file.filename().string() : "no map",
+                     s.scene.map && !s.scene.map->file.empty()
+                         ? s.scene.map->file.filename().string()
+                         : "no map file",
                      s.scene.obstacles.size(), s.scene.planner ? s.scene.planner->name : "none");
 }
 

@@ -1,7 +1,12 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
+#include <array>
+#include <limits>
+
 #include "bound_controller.hpp"
+#include "hamelin/core/error.hpp"
 #include "hamelin/scene/parts.hpp"
 
 namespace hamelin::python {
@@ -10,6 +15,28 @@ namespace {
 
 const std::filesystem::path& folder_of(const BoundWorld& w) {
   return w.owner->scene->folder;
+}
+
+using Points = py::array_t<float, py::array::c_style | py::array::forcecast>;
+
+control::PointFrame frame_of(const Points& points, py::handle pose, double time_s,
+                             const std::string& mount, double range_m) {
+  if (points.ndim() != 2 || points.shape(1) != 3)
+    throw Error(ErrorCode::usage, "insert_points: points: expected an array of shape (N, 3)");
+  control::PointFrame frame;
+  frame.points = Eigen::Map<const Eigen::Matrix3Xf>(points.data(), 3, points.shape(0));
+  frame.sensor = pose_of("insert_points", "pose", pose);
+  frame.time_s = time_s;
+  frame.range_m = range_m;
+  constexpr std::array mounts{scene::Mount::world, scene::Mount::base, scene::Mount::tip};
+  const auto* const found = std::find_if(mounts.begin(), mounts.end(), [&](scene::Mount m) {
+    return scene::to_string(m) == mount;
+  });
+  if (found == mounts.end())
+    throw Error(ErrorCode::usage, fmt::format(
+        "insert_points: mount: '{}' given, expected 'world', 'base' or 'tip'", mount));
+  frame.mount = *found;
+  return frame;
 }
 
 }  // namespace
@@ -95,6 +122,34 @@ void add_world(py::module_& module) {
           arg("change"),
           "Frees and occupies voxels of the map now: a dict as in /map/changes of a scene, whose\n"
           "time_s may be left out and is not used.")
+      .def(
+          "insert_points",
+          [](const BoundWorld& w, const Points& points, py::handle pose, double time_s,
+             const std::string& mount, double range_m) {
+            const control::PointFrame frame = frame_of(points, pose, time_s, mount, range_m);
+            control::FrameReport report;
+            {
+              const py::gil_scoped_release unlocked;
+              report = w.get().insert_points(frame);
+            }
+            py::dict out;
+            out["snapshot"] = report.snapshot;
+            out["points"] = report.points;
+            out["on_arm"] = report.on_arm;
+            out["on_obstacles"] = report.on_obstacles;
+            out["occupied"] = report.occupied;
+            out["cleared"] = report.cleared;
+            return out;
+          },
+          arg("points"), arg("pose"), py::kw_only(), arg("time"), arg("mount") = "world",
+          arg("range") = std::numeric_limits<double>::infinity(),
+          "Makes what a depth sensor saw part of the map, which must exist. points: shape (N, 3),\n"
+          "in the sensor's frame, finite [m]. pose: of the sensor in the frame of its mount,\n"
+          "\"world\", \"base\" or \"tip\", shape (4, 4). time: when they were seen [s]. range: of\n"
+          "points that are farther only the way up to there is free [m]. Points on the arm, its\n"
+          "load or a known obstacle are left out, and rays to the others free what they pass.\n"
+          "Returns the number of the snapshot that knows the frame, and counts of points and\n"
+          "voxels.")
       .def_property_readonly(
           "number",
           [](const BoundWorld& w) {

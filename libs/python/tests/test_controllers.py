@@ -168,6 +168,32 @@ def test_trajectories_and_targets_are_in_the_answer(scene):
         controller.set_goals({"type": "trajectory", "trajectory": points})
 
 
+def test_points_of_a_depth_camera(document, scenes):
+    document["map"] = {"resolution_m": 0.02}
+    controller = hamelin.Controller(hamelin.Scene(document, folder=scenes))
+    world, q, v = controller.world, hamelin.Scene(document, folder=scenes).start_q, np.zeros(7)
+    controller.tick(0.0, q, v)
+    y, z = np.meshgrid(np.arange(-0.2, 0.2, 0.02) + 0.013, np.arange(0.4, 0.8, 0.02) + 0.013)
+    wall = np.column_stack([np.full(y.size, 1.613), y.ravel(), z.ravel() - 1.2])
+    pose = np.eye(4)
+    pose[:3, 3] = [-0.8, 0.0, 1.2]
+    report = world.insert_points(wall, pose, time=0.0, range=3.0)
+    assert report["points"] + report["on_arm"] == y.size
+    assert report["occupied"] == report["points"] > 100
+    assert report["snapshot"] == world.number == 1
+    assert world.insert_points(wall, pose, time=0.0)["snapshot"] == 1  # nothing new
+    for call, message in (
+        (lambda: world.insert_points(wall[:, :2], pose, time=0.0), "shape \\(N, 3\\)"),
+        (lambda: world.insert_points(wall * np.nan, pose, time=0.0), "one is not finite"),
+        (lambda: world.insert_points(wall[:0], pose, time=0.0), "0 given"),
+        (lambda: world.insert_points(wall, pose, time=9.0), "seen at 9 s"),
+        (lambda: world.insert_points(wall, pose, time=0.0, mount="hand"), "'hand' given"),
+    ):
+        with pytest.raises(hamelin.Error, match=message):
+            call()
+    assert world.number == 1
+
+
 def test_maps_as_dicts(document, scene, scenes):
     controller = hamelin.Controller(scene)
     world, q, v = controller.world, scene.start_q, np.zeros(7)

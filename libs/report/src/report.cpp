@@ -40,7 +40,7 @@ Json read_first_line(log::LogReader& reader, const std::filesystem::path& file) 
 
 // Whether the map of the run is available and unchanged.
 bool has_original_map(const simulation::Recorded& recorded) {
-  return recorded.scene.map &&
+  return recorded.scene.map && !recorded.scene.map->file.empty() &&
          std::none_of(recorded.changed.begin(), recorded.changed.end(),
                       [](const auto& changed) { return changed.role == "map"; });
 }

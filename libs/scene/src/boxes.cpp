@@ -301,6 +301,17 @@ CutOut cut_out(const std::vector<Cell>& cells, double resolution,
   return cut;
 }
 
+std::size_t voxels_in(const std::vector<VoxelBox>& boxes) {
+  std::size_t voxels = 0;
+  for (const VoxelBox& box : boxes) {
+    std::size_t product = 1;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      product *= static_cast<std::size_t>(box.hi[axis] - box.lo[axis]);
+    voxels += product;
+  }
+  return voxels;
+}
+
 double volume_inside(const std::vector<Cell>& cells, double resolution, const Ball& ball) {
   double voxels = 0.0;
   const double radius2 = ball.radius * ball.radius;

@@ -106,11 +106,19 @@ Environment Environment::with_obstacles(std::vector<Obstacle> obstacles,
   return copy;
 }
 
-Environment Environment::with_change(const MapChangeSpec& change) const {
+void Environment::require_map() const {
   if (!map_spec_) throw Error(ErrorCode::invalid, "map: there is none, expected a map to change");
-  const MapChange read = read_change(change, *map_spec_, summary_.resolution_m, map_ball_);
+}
+
+Environment Environment::with_change(const MapChangeSpec& change) const {
+  require_map();
+  return with_change(read_change(change, *map_spec_, summary_.resolution_m, map_ball_));
+}
+
+Environment Environment::with_change(const MapChange& change) const {
+  require_map();
   Environment copy = *this;
-  (void)copy.apply(read);
+  (void)copy.apply(change);
   return copy;
 }
 

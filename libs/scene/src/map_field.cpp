@@ -19,17 +19,6 @@ std::vector<Box> in_metres(const std::vector<VoxelBox>& voxels, double resolutio
   return boxes;
 }
 
-std::size_t volume(const std::vector<VoxelBox>& boxes) {
-  std::size_t voxels = 0;
-  for (const VoxelBox& box : boxes) {
-    std::size_t product = 1;
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      product *= static_cast<std::size_t>(box.hi[axis] - box.lo[axis]);
-    voxels += product;
-  }
-  return voxels;
-}
-
 }  // namespace
 
 MapField::MapField(const std::vector<Cell>& cells, double resolution,
@@ -73,11 +62,11 @@ MapField::Changed MapField::change(const std::vector<VoxelBox>& add,
     if (cut.empty() || cut.back() != box) {
       cut.push_back(box);
       rest.push_back({voxels_of(box)});
-      changed.removed += volume(rest.back());
+      changed.removed += voxels_in(rest.back());
     }
     subtract(rest.back(), *hole);
   }
-  for (const auto& pieces : rest) changed.removed -= volume(pieces);
+  for (const auto& pieces : rest) changed.removed -= voxels_in(pieces);
   // The second tree gets the boxes of earlier additions that were not cut, the remaining pieces,
   // and the new boxes.
   std::vector<VoxelBox> added;
@@ -97,7 +86,7 @@ MapField::Changed MapField::change(const std::vector<VoxelBox>& add,
       for (const VoxelBox& piece : rest[static_cast<std::size_t>(at - cut.begin())])
         subtract(pieces, piece);
     }
-    changed.added += volume(pieces);
+    changed.added += voxels_in(pieces);
     added.insert(added.end(), pieces.begin(), pieces.end());
   }
   if (changed.added == 0 && changed.removed == 0) return changed;

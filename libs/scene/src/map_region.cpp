@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/scene/sensors.hpp"
 
 namespace hamelin::scene {
 
@@ -19,6 +20,18 @@ std::string_view to_string(UnknownPolicy policy) noexcept {
       return "slow";
     case UnknownPolicy::block:
       return "block";
+  }
+  return "unknown";
+}
+
+std::string_view to_string(Mount mount) noexcept {
+  switch (mount) {
+    case Mount::world:
+      return "world";
+    case Mount::base:
+      return "base";
+    case Mount::tip:
+      return "tip";
   }
   return "unknown";
 }
@@ -82,9 +95,30 @@ void filter_robot(const MapSpec& map, const RobotAtStart& robot,
                   summary.self_filter_unknown_voxels, *map.self_filter_padding_m));
 }
 
+// Cells of moderate size, since later changes of the map cut them.
+std::vector<Cell> cells_around(const Ball& ball, double resolution) {
+  constexpr std::int32_t edge = 64;
+  std::array<std::int32_t, 3> lo{}, hi{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double cell = edge * resolution, center = ball.center[static_cast<Eigen::Index>(i)];
+    const auto at = [&](double x) {
+      const double most = tree_half / edge;
+      return static_cast<std::int32_t>(std::clamp(std::floor(x / cell), -most, most - 1.0));
+    };
+    lo[i] = at(center - ball.radius);
+    hi[i] = at(center + ball.radius) + 1;
+  }
+  std::vector<Cell> cells;
+  for (std::int32_t z = lo[2]; z < hi[2]; ++z)
+    for (std::int32_t y = lo[1]; y < hi[1]; ++y)
+      for (std::int32_t x = lo[0]; x < hi[0]; ++x)
+        cells.push_back({{edge * x, edge * y, edge * z}, edge});
+  return crop(cells, resolution, ball);
+}
+
 // Refuses or warns where unknown space matters and most of the reachable ball is unknown.
 void check_unknown_share(const MapSpec& map, MapSummary& summary) {
-  if (!summary.within_reach || summary.within_reach->unknown <= 0.5) return;
+  if (map.file.empty() || !summary.within_reach || summary.within_reach->unknown <= 0.5) return;
   const Shares& shares = *summary.within_reach;
   const double percent = 100.0 * shares.unknown;
   if (shares.free > 0.0) {
@@ -125,8 +159,21 @@ Shares shares_within(const MapData& map, const Ball& ball) {
 }
 
 Shares shares_within_reach(const MapSpec& map, const geometry::SE3& base, double reach) {
-  return shares_within(read_map(map.file, {map.scale, map.occupancy_threshold}),
-                       {map.pose.inverse() * base.p(), reach});
+  const Ball ball{map.pose.inverse() * base.p(), reach};
+  return shares_within(read_map(map, ball), ball);
+}
+
+MapData read_map(const MapSpec& map, const Ball& ball) {
+  if (!map.file.empty()) return read_map(map.file, {map.scale, map.occupancy_threshold});
+  if (!(map.resolution_m > 0.0) || !std::isfinite(map.resolution_m))
+    throw Error(ErrorCode::invalid,
+                fmt::format("map: resolution_m: {} m given, expected a number above 0",
+                            map.resolution_m));
+  MapData data;
+  data.file = "map without a file";
+  data.resolution = map.resolution_m;
+  data.unknown = cells_around(ball, map.resolution_m);
+  return data;
 }
 
 MapRegion read_region(const MapSpec& map, const geometry::SE3& base, double reach, double influence,
@@ -135,9 +182,9 @@ MapRegion read_region(const MapSpec& map, const geometry::SE3& base, double reac
     throw Error(ErrorCode::usage,
                 fmt::format("{}: reach {} m and influence {} m, expected finite numbers from 0 up",
                             map.file.string(), reach, influence));
-  MapData data = read_map(map.file, {map.scale, map.occupancy_threshold});
   const geometry::SE3 map_from_world = map.pose.inverse();
   const Eigen::Vector3d center = map_from_world * base.p();
+  MapData data = read_map(map, {center, reach + influence});
   MapRegion region;
   region.resolution_m = data.resolution;
   region.ball = {center, reach + influence};

@@ -516,9 +516,30 @@ RobotRef read_robot_ref(const Reader& in, const std::filesystem::path& folder) {
           path("srdf")};
 }
 
+PointsSpec read_points_spec(const Reader& in) {
+  PointsSpec points;
+  for (auto [key, value] : {std::pair{"margin_m", &points.margin_m},
+                            {"time_error_s", &points.time_error_s},
+                            {"age_max_s", &points.age_max_s},
+                            {"hit", &points.hit},
+                            {"miss", &points.miss},
+                            {"least", &points.least},
+                            {"most", &points.most}})
+    *value = in.get(key, *value);
+  if (points.least > points.most)
+    in.fail("least", fmt::format("{} is above most, {}", points.least, points.most));
+  return points;
+}
+
 MapSpec read_map_spec(const Reader& in, const std::filesystem::path& folder) {
   MapSpec map;
-  map.file = resolve_path(folder, in.get<std::string>("file", ""));
+  if (const auto file = in.maybe<std::string>("file")) map.file = resolve_path(folder, *file);
+  const auto resolution_m = in.maybe<double>("resolution_m");
+  if (map.file.empty() && !resolution_m)
+    in.fail("file", "is missing, expected it or, for a map that sensors make, resolution_m");
+  if (!map.file.empty() && resolution_m)
+    in.fail("resolution_m", "is given in addition to file, expected one of them");
+  map.resolution_m = resolution_m.value_or(map.resolution_m);
   map.pose = in.pose();
   map.quaternion_wxyz = in.quaternion();
   map.scale = in.maybe<double>("scale");
@@ -531,6 +552,10 @@ MapSpec read_map_spec(const Reader& in, const std::filesystem::path& folder) {
   if (const Json* filter = in.find("self_filter"); filter != nullptr && *filter != Json(false))
     map.self_filter_padding_m =
         in.child("self_filter").get("padding_m", default_self_filter_padding_m);
+  map.known = in.get("known", true);
+  if (!map.known && map.file.empty())
+    in.fail("known", "is false, but there is no file, expected one that sensors see");
+  map.points = read_points_spec(in.child("points"));
   in.each("changes", [&](const Reader& change) {
     const double last_s = map.changes.empty() ? 0.0 : map.changes.back().time_s;
     map.changes.push_back(read_map_change(change, folder));
@@ -540,6 +565,31 @@ MapSpec read_map_spec(const Reader& in, const std::filesystem::path& folder) {
                                         time_s, last_s));
   });
   return map;
+}
+
+std::vector<SensorSpec> read_sensors(const Reader& in, const Scene& scene) {
+  std::vector<SensorSpec> out;
+  in.each("sensors", [&](const Reader& given) {
+    SensorSpec sensor;
+    sensor.name = given.get<std::string>("name", fmt::format("camera {}", out.size() + 1));
+    const auto mount = given.get<std::string>("mount", "world");
+    sensor.mount = mount == "tip" ? Mount::tip : mount == "base" ? Mount::base : Mount::world;
+    sensor.pose = given.pose();
+    sensor.quaternion_wxyz = given.quaternion();
+    if (const auto size = given.get<std::vector<int>>("size", {}); !size.empty()) {
+      sensor.width = size[0];
+      sensor.height = size[1];
+    }
+    sensor.fov_rad = given.get("fov_rad", sensor.fov_rad);
+    sensor.rate_hz = given.get("rate_hz", sensor.rate_hz);
+    sensor.range_m = given.get("range_m", sensor.range_m);
+    sensor.noise_m = given.get("noise_m", sensor.noise_m);
+    sensor.delay_s = given.get("delay_s", sensor.delay_s);
+    if (!scene.map)
+      given.fail("type", "there is no map, expected one in the scene, into which a sensor sees");
+    out.push_back(std::move(sensor));
+  });
+  return out;
 }
 
 std::vector<Event> read_events(const Reader& in, const std::filesystem::path& folder,
@@ -625,6 +675,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
   scene.goals = read_goals(in, base_dir);
   scene.obstacles = read_obstacles(in, base_dir);
   if (in.find("map") != nullptr) scene.map = read_map_spec(in.child("map"), base_dir);
+  scene.sensors = read_sensors(in, scene);
   scene.model = read_model(in.child("model"));
   if (in.find("planner") != nullptr) {
     const Reader planner = in.child("planner");
@@ -661,7 +712,7 @@ std::vector<std::filesystem::path> input_files(const Scene& scene) {
     if (const auto file = target_file(goal); !file.empty()) files.push_back(file);
   }
   if (!scene.map) return files;
-  files.push_back(scene.map->file);
+  if (!scene.map->file.empty()) files.push_back(scene.map->file);
   for (const MapChangeSpec& change : scene.map->changes)
     if (change.file) files.push_back(*change.file);
   for (const Event& event : scene.events)

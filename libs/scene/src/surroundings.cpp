@@ -12,16 +12,15 @@ namespace {
 class RobotShapesAtStart {
  public:
   RobotShapesAtStart(const Scene& scene, const model::Model& model);
-  [[nodiscard]] RobotAtStart view() const { return {arm_.view(), {centers_, radii_, half_axes_}}; }
+  [[nodiscard]] RobotAtStart view() const { return {arm_.view(), base_.view()}; }
 
  private:
   PlacedShapes arm_;
-  std::vector<Eigen::Vector3d> centers_, half_axes_;  // of the base
-  std::vector<double> radii_;
+  BaseShapes base_;
 };
 
 RobotShapesAtStart::RobotShapesAtStart(const Scene& scene, const model::Model& model)
-    : arm_(model) {
+    : arm_(model), base_(model) {
   const Eigen::VectorXd q =
       scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(model.dof());
   if (q.size() != model.dof())
@@ -31,6 +30,11 @@ RobotShapesAtStart::RobotShapesAtStart(const Scene& scene, const model::Model& m
   dynamics::Workspace ws(model);
   dynamics::forward_kinematics(model, ws, q);
   arm_.place(model, ws);
+}
+
+}  // namespace
+
+BaseShapes::BaseShapes(const model::Model& model) {
   const auto add = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to, double radius) {
     centers_.push_back(model.base() * Eigen::Vector3d(0.5 * (from + to)));
     half_axes_.push_back(model.base().R() * (0.5 * (to - from)));
@@ -41,8 +45,6 @@ RobotShapesAtStart::RobotShapesAtStart(const Scene& scene, const model::Model& m
   for (const auto& capsule : model.robot().base_segments)
     add(capsule.from_m, capsule.to_m, capsule.radius_m);
 }
-
-}  // namespace
 
 MapRegion make_region(const Scene& scene, const model::Model& model, double influence) {
   if (!scene.map)

@@ -105,7 +105,8 @@ Json change_json(const MapChangeSpec& change) {
 }
 
 Json map_json(const MapSpec& map) {
-  Json out{{"file", map.file.string()}};
+  Json out{{"file", map.file.empty() ? Json(nullptr) : Json(map.file.string())}};
+  if (map.file.empty()) out["resolution_m"] = map.resolution_m;
   out.update(pose_json(map.pose, map.quaternion_wxyz));
   out["scale"] = or_null(map.scale);
   out["occupancy_threshold"] = map.occupancy_threshold;
@@ -113,8 +114,29 @@ Json map_json(const MapSpec& map) {
   out["keep_out_radius_m"] = map.keep_out_radius_m;
   out["self_filter"] = nullptr;
   if (map.self_filter_padding_m) out["self_filter"] = {{"padding_m", *map.self_filter_padding_m}};
+  out["known"] = map.known;
+  const PointsSpec& points = map.points;
+  out["points"] = {{"margin_m", points.margin_m},
+                   {"time_error_s", points.time_error_s},
+                   {"age_max_s", points.age_max_s},
+                   {"hit", points.hit},
+                   {"miss", points.miss},
+                   {"least", points.least},
+                   {"most", points.most}};
   out["changes"] = Json::array();
   for (const MapChangeSpec& change : map.changes) out["changes"].push_back(change_json(change));
+  return out;
+}
+
+Json sensor_json(const SensorSpec& sensor) {
+  Json out{{"type", "depth"}, {"name", sensor.name}, {"mount", to_string(sensor.mount)}};
+  out.update(pose_json(sensor.pose, sensor.quaternion_wxyz));
+  out["fov_rad"] = sensor.fov_rad;
+  out["size"] = {sensor.width, sensor.height};
+  out["rate_hz"] = sensor.rate_hz;
+  out["range_m"] = sensor.range_m;
+  out["noise_m"] = sensor.noise_m;
+  out["delay_s"] = sensor.delay_s;
   return out;
 }
 
@@ -378,6 +400,8 @@ Json resolved_json(const Scene& scene) {
   out["map"] = scene.map ? map_json(*scene.map) : Json(nullptr);
   out["obstacles"] = Json::array();
   for (const Obstacle& obstacle : scene.obstacles) out["obstacles"].push_back(to_json(obstacle));
+  out["sensors"] = Json::array();
+  for (const SensorSpec& sensor : scene.sensors) out["sensors"].push_back(sensor_json(sensor));
   for (const Event& event : scene.events) out["events"].push_back(event_json(event));
   out["model"] = model_json(scene.model);
   out["actuation"] = actuation_json(scene.actuation);

@@ -13,6 +13,7 @@
 #include "hamelin/core/rng.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/test/allocations.hpp"
+#include "hamelin/test/errors.hpp"
 #include "hamelin/test/scene_queries.hpp"
 #include "hamelin/test/temporary.hpp"
 
@@ -137,6 +138,31 @@ TEST_CASE("a map changes when a change is due, and changed voxels are known", "[
       {1.0, std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "maps" / "clutter.bt", {}, {}}};
   CHECK_THROWS_WITH(Environment(spec, {}, {}, 0.9, 0.2),
                     Catch::Contains("clutter.bt: resolution 0.02 m"));
+}
+
+TEST_CASE("in a map without a file all is unknown", "[scene][unit]") {
+  const std::vector<Vector3d> at{{0.3, 0.1, 0.2}};
+  const std::vector<double> radius{0.05};
+  const auto clearance = [&](UnknownPolicy unknown, double keep_out_m) {
+    MapSpec map;
+    map.resolution_m = 0.02;
+    map.unknown = unknown;
+    map.keep_out_radius_m = keep_out_m;
+    const Environment environment(map, {}, {}, 1.0, 0.2);
+    CHECK(environment.summary().has_map);
+    CHECK(environment.map_field().empty());
+    return environment.clearance({at, radius}, 0.0, 0.5);
+  };
+  CHECK(clearance(UnknownPolicy::free, 0.0) == 0.5);
+  CHECK(clearance(UnknownPolicy::block, 0.0) < -0.2);
+  // the voxels that the ball touches are free
+  const double beyond_m = 0.6 - at[0].norm() - radius[0], there = clearance(UnknownPolicy::block, 0.6);
+  CHECK(there >= beyond_m);
+  CHECK(there < beyond_m + 0.02 * std::sqrt(3.0));
+  MapSpec map;
+  map.resolution_m = 0.0;
+  CHECK_THAT(test::error_of([&] { Environment(map, {}, {}, 1.0, 0.2); }),
+             Catch::Contains("resolution_m: 0 m given"));
 }
 
 TEST_CASE("the keep-out ball frees unknown space around the base", "[scene][unit]") {

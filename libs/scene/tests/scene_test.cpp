@@ -376,6 +376,56 @@ TEST_CASE("a self-filter may be true, false or a padding", "[scene][unit]") {
   CHECK(refusal(document).find("'padding_m'") != std::string::npos);
 }
 
+TEST_CASE("maps that sensors make, and sensors, are read and read back", "[scene][unit]") {
+  Json document = small_document();
+  document["map"] = {{"resolution_m", 0.02}, {"unknown", "block"}, {"points", {{"margin_m", 0.01}}}};
+  document["sensors"] = {{{"type", "depth"},
+                          {"mount", "tip"},
+                          {"position_m", {0.0, 0.1, 0.05}},
+                          {"size", {32, 24}},
+                          {"rate_hz", 5.0}},
+                         {{"type", "depth"}, {"name", "beside"}}};
+  const auto read = [&] { return scene_from_json(document, ".", "x.json"); };
+  const auto check_read = [](const Scene& scene) {
+    REQUIRE(scene.map);
+    CHECK(scene.map->file.empty());
+    CHECK(scene.map->resolution_m == 0.02);
+    CHECK(scene.map->points.margin_m == 0.01);
+    CHECK(scene.map->points.most == 0.75);
+    REQUIRE(scene.sensors.size() == 2);
+    CHECK(scene.sensors[0].name == "camera 1");
+    CHECK(scene.sensors[0].mount == Mount::tip);
+    CHECK(scene.sensors[0].pose.p().y() == 0.1);
+    CHECK(scene.sensors[0].width == 32);
+    CHECK(scene.sensors[0].rate_hz == 5.0);
+    CHECK(scene.sensors[1].name == "beside");
+    CHECK(scene.sensors[1].mount == Mount::world);
+    CHECK(input_files(scene).size() == 1);
+  };
+  check_read(read());
+  check_read(scene_from_json(resolved_json(read()), ".", "x.json"));
+  document["map"]["points"]["least"] = 0.45;
+  document["map"]["points"]["most"] = 0.5;
+  CHECK(read().map->points.least == 0.45);
+  document["map"] = {{"unknown", "block"}};
+  CHECK_THROWS_WITH(read(),
+                    "x.json: /map/file: is missing, expected it or, for a map that sensors make, "
+                    "resolution_m");
+  document["map"] = {{"file", "m.bt"}, {"resolution_m", 0.02}};
+  CHECK_THROWS_WITH(
+      read(), "x.json: /map/resolution_m: is given in addition to file, expected one of them");
+  document["map"] = {{"resolution_m", 0.02}, {"known", false}};
+  CHECK_THROWS_WITH(read(),
+                    "x.json: /map/known: is false, but there is no file, expected one that sensors "
+                    "see");
+  document["map"] = {{"file", "m.bt"}, {"known", false}};
+  CHECK_FALSE(read().map->known);
+  document["map"] = nullptr;
+  CHECK_THROWS_WITH(read(),
+                    "x.json: /sensors/0/type: there is no map, expected one in the scene, into "
+                    "which a sensor sees");
+}
+
 TEST_CASE("set_pointer sets keys that the schema defines and nothing else", "[scene][unit]") {
   Json document = full_document();
   set_pointer(document, "/step_s=0.002");

@@ -21,6 +21,9 @@ namespace {
 
 constexpr std::int64_t voxels_max = std::int64_t{1} << 32;
 
+// The log-odds of a voxel that no frame has told about.
+constexpr float not_measured = std::numeric_limits<float>::quiet_NaN();
+
 [[noreturn]] void refuse(const std::string& what) {
   throw Error(ErrorCode::invalid, "occupancy grid: " + what);
 }
@@ -38,7 +41,7 @@ float log_odds_of(const char* name, double p) {
 struct OccupancyGrid::Block {
   static constexpr std::int32_t edge = 8, row = 64;
   std::array<float, static_cast<std::size_t>(edge* edge* row)> values;
-  Block() { values.fill(std::numeric_limits<float>::quiet_NaN()); }
+  Block() { values.fill(not_measured); }
   float* at(std::int32_t y, std::int32_t z) {
     return values.data() + (z % edge * edge + y % edge) * row;
   }
@@ -196,7 +199,7 @@ std::uint64_t OccupancyGrid::update(std::size_t word, std::uint64_t free, std::u
     const int i = std::countr_zero(left);
     const std::uint64_t bit = std::uint64_t{1} << i;
     float& value = values[i];
-    const float before = std::isnan(value) ? 0.0F : value;
+    const float before = std::isnan(value) ? value_of(word, bit) : value;
     value = std::clamp(before + ((occupied & bit) != 0 ? model_.hit : model_.miss), model_.least,
                        model_.most);
     now = value >= model_.occupied ? now | bit : now & ~bit;
@@ -233,6 +236,44 @@ std::span<const OccupancyGrid::Row> OccupancyGrid::insert(
   return rows_;
 }
 
+float OccupancyGrid::value_of(std::size_t word, std::uint64_t bit) const noexcept {
+  if ((known_.words[word] & bit) == 0) return 0.0F;
+  return (occupied_.words[word] & bit) != 0 ? model_.most : model_.least;
+}
+
+void OccupancyGrid::set(std::size_t word, std::uint64_t mask, State state) {
+  const auto change = [&](Bits& bits, bool on) {
+    bits.words[word] = on ? bits.words[word] | mask : bits.words[word] & ~mask;
+  };
+  change(known_, state != State::unknown);
+  change(occupied_, state == State::occupied);
+  const Voxel first = first_of(word);
+  Block* const block = blocks_[block_of(first)].get();
+  if (block == nullptr) return;
+  float* const values = block->at(first[1] - box_.lo[1], first[2] - box_.lo[2]);
+  for (std::uint64_t left = mask; left != 0; left &= left - 1)
+    values[std::countr_zero(left)] = not_measured;
+}
+
+void OccupancyGrid::set(const scene::VoxelBox& box, State state) {
+  scene::VoxelBox part;
+  for (std::size_t i = 0; i < 3; ++i) {
+    part.lo[i] = std::max(box.lo[i], box_.lo[i]);
+    part.hi[i] = std::min(box.hi[i], box_.hi[i]);
+    if (part.lo[i] >= part.hi[i]) return;
+  }
+  for (std::int32_t z = part.lo[2]; z < part.hi[2]; ++z)
+    for (std::int32_t y = part.lo[1]; y < part.hi[1]; ++y) {
+      const auto row = static_cast<std::size_t>(bit_of({box_.lo[0], y, z}) / 64);
+      for (std::int32_t x = part.lo[0] - box_.lo[0], last = part.hi[0] - box_.lo[0]; x < last;) {
+        const std::int32_t first = x % 64, count = std::min(64 - first, last - x);
+        set(row + static_cast<std::size_t>(x / 64), (~std::uint64_t{0} >> (64 - count)) << first,
+            state);
+        x += count;
+      }
+    }
+}
+
 OccupancyGrid::State OccupancyGrid::state(const Voxel& voxel) const {
   if (!contains(voxel)) return State::unknown;
   const auto bit = static_cast<std::size_t>(bit_of(voxel));
@@ -241,13 +282,14 @@ OccupancyGrid::State OccupancyGrid::state(const Voxel& voxel) const {
 }
 
 float OccupancyGrid::log_odds(const Voxel& voxel) const {
-  constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
-  if (!contains(voxel)) return unknown;
+  if (state(voxel) == State::unknown) return std::numeric_limits<float>::quiet_NaN();
   const auto bit = static_cast<std::size_t>(bit_of(voxel));
   const Voxel first = first_of(bit / 64);
   Block* const block = blocks_[block_of(first)].get();
-  return block == nullptr ? unknown
+  const float value = block == nullptr
+                          ? not_measured
                           : block->at(first[1] - box_.lo[1], first[2] - box_.lo[2])[bit % 64];
+  return std::isnan(value) ? value_of(bit / 64, std::uint64_t{1} << (bit % 64)) : value;
 }
 
 std::size_t OccupancyGrid::bytes() const noexcept {

@@ -93,6 +93,9 @@ void ClosedLoop::observe_node() {
     finish(log::Outcome::collision, judge_->contact_on_the_way());
   reveal_obstacles();
   change_map();
+  if (sensors_)
+    sensors_->advance(plant_->node().time_s, judge_->view(), *controller_,
+                      [this](const std::string& line) { report_event(true, line); });
   recorder_->observe(judge_->view().clearance_m(), judge_->certified(), plant_->node().v,
                      scene_.step_s);
 }
@@ -118,7 +121,8 @@ void ClosedLoop::change_map() {
        next_map_change_ < changes.size() &&
        changes[next_map_change_].time_s <= plant_->node().time_s + 1e-9;
        ++next_map_change_)
-    controller_->world().change_map(changes[next_map_change_]);
+    if (scene_.map->known) controller_->world().change_map(changes[next_map_change_]);
+  if (sensors_) sensors_->change_map();
   judge_->look_again();
 }
 

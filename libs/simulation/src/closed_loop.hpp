@@ -10,6 +10,7 @@
 #include "hamelin/simulation/run.hpp"
 #include "judge.hpp"
 #include "recorder.hpp"
+#include "sensor_feed.hpp"
 #include "target_feed.hpp"
 #include "tick_log.hpp"
 #include "tracking_audit.hpp"
@@ -116,6 +117,7 @@ class ClosedLoop {
   log::Result result_;
   std::unique_ptr<control::Controller> controller_;
   std::unique_ptr<Judge> judge_;
+  std::unique_ptr<SensorFeed> sensors_;  ///< null if the scene has none
   std::unique_ptr<Actuation> actuation_;
   Eigen::VectorXd q_shown_, v_shown_;  ///< to the controller
 

@@ -34,7 +34,7 @@ std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Pl
                                    const Json& params) {
   std::vector<log::Input> inputs = inputs_of(scene);
   if (scene.map) {
-    inputs.push_back({"map", scene.map->file});
+    if (!scene.map->file.empty()) inputs.push_back({"map", scene.map->file});
     for (std::size_t i = 0; i < scene.map->changes.size(); ++i)
       if (const auto& file = scene.map->changes[i].file)
         inputs.push_back({fmt::format("map_change_{}", i), *file});
@@ -85,6 +85,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   if (const control::WorldView& view = judge_->view();
       view.has_self() && !view.self_field()->note().empty())
     result_.warnings.push_back(view.self_field()->note());
+  if (!scene.sensors.empty()) sensors_ = std::make_unique<SensorFeed>(scene, model_);
   inputs_ = all_inputs(scene, plugin, planner_params_);
 }
 
@@ -92,7 +93,7 @@ control::Controller::Options ClosedLoop::controller_options() {
   control::Controller::Options options;
   options.obstacles_max = 0;  // no more than the scene's
   options.prepare_maps = false;
-  options.fixed_world = true;
+  options.fixed_world = scene_.sensors.empty();
   options.path_points_max = 0;   // no more than the scene's
   options.guide_thread = false;  // results do not depend on the speed of the machine
   options.certify = false;       // the judge does, for every step and with all obstacles

@@ -50,6 +50,7 @@ void ClosedLoop::fill_result() {
     if (shield->counts.strayed_share > 1.0)
       result_.warnings.push_back(shield_warning(shield->counts, model_));
   }
+  if (sensors_) sensors_->fill(result_);
   if (const control::GuideFigures* const guide = controller_->guide_figures())
     result_.guide = {std::string(to_string(scene_.guide.type)),
                      guide->searches,

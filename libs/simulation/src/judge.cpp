@@ -18,7 +18,7 @@ bool controller_sees_all(const scene::Scene& scene) {
   const bool exact =
       scene.actuation.joint_noise_rad == 0.0 && scene.actuation.planner_mass_scale == 1.0 &&
       !scene.actuation.estimates_velocity && scene.actuation.type != scene::ActuationType::position;
-  return exact && scene.events.empty() && !(scene.map && !scene.map->changes.empty()) &&
+  return exact && scene.events.empty() && scene.sensors.empty() && !(scene.map && !scene.map->changes.empty()) &&
          std::all_of(scene.obstacles.begin(), scene.obstacles.end(),
                      [](const auto& o) { return o.known && !o.judge_only; });
 }
@@ -39,6 +39,8 @@ Judge::Judge(const scene::Scene& scene, const model::Model& model, const Plant& 
       view_(controllers) {
   if (controllers == nullptr)
     own_ = std::make_unique<control::WorldView>(scene, model, control::default_influence_m);
+  else if (scene.map && !scene.map->known)
+    own_ = std::make_unique<control::WorldView>(scene, model, controllers->influence_m());
   else if (!controller_sees_all(scene))
     own_ = std::make_unique<control::WorldView>(scene, model, *controllers);
   if (own_) view_ = own_.get();

@@ -70,6 +70,7 @@ void ClosedLoop::complete(const scene::Event& event, bool accepted) {
   if (event.map) {
     judge_->change_map(*event.map);
     plant_->change_map(*event.map);
+    if (sensors_) sensors_->change_map();
     report_event(false, "the map changes");
   }
   if (accepted && event.attach) {

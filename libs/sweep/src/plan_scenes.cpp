@@ -27,7 +27,8 @@ Eigen::VectorXd joint_vector(const Json& values) {
 }
 
 std::string map_label(const scene::Scene& scene) {
-  return scene.map ? scene.map->file.filename().string() : "none";
+  if (!scene.map) return "none";
+  return scene.map->file.empty() ? "seen" : scene.map->file.filename().string();
 }
 
 }  // namespace

@@ -246,3 +246,44 @@ TEST_CASE("in C, maps that are not valid are refused with their place", "[contro
   loop.move(1);
   CHECK(loop.answer.snapshot == 0);
 }
+
+TEST_CASE("points from C become part of the map, and what makes no sense is refused",
+          "[control_loop][points]") {
+  Json document = c_document("reporting");
+  document["map"] = {{"resolution_m", 0.02}};
+  CLoop loop(document);
+  (void)loop.tick();
+  const float points[] = {0.613F, 0.5F, 0.6F, 0.613F, 0.52F, 0.6F};
+  hamelin_point_frame frame{};
+  frame.struct_size = sizeof frame;
+  frame.points_m = points;
+  frame.points = 2;
+  frame.quaternion_wxyz[0] = 1.0;
+  hamelin_frame_report report{};
+  report.struct_size = sizeof report;
+  const auto insert = [&] {
+    return hamelin_controller_insert_points(loop.controller, &frame, &report, loop.error.data(),
+                                            loop.error.size());
+  };
+  // seen from where the arm's base is, which is not occupied
+  loop.require(insert());
+  CHECK(report.snapshot == 1);
+  CHECK(report.points + report.on_arm == 2);
+  CHECK(report.points == report.occupied);
+  CHECK(report.on_obstacles == 0);
+  frame.mount = 3;
+  CHECK_THAT(loop.failure(insert()), Contains("the sensor's mount is unknown"));
+  frame.mount = HAMELIN_MOUNT_TIP;
+  loop.require(insert());
+  frame.points = 3'000'000;
+  CHECK_THAT(loop.failure(insert()), Contains("points: 3000000 given, expected 1 to 2000000"));
+  frame.points = 2;
+  frame.points_m = nullptr;
+  CHECK_THAT(loop.failure(insert()), Contains("frame: points_m: is null"));
+  frame.points_m = points;
+  frame.time_s = 5.0;
+  CHECK_THAT(loop.failure(insert()), Contains("points: seen at 5 s"));
+  frame.time_s = 0.0;
+  report.struct_size = 4;
+  CHECK_THAT(loop.failure(insert()), Contains("report: is null or its struct_size is too small"));
+}

@@ -34,6 +34,24 @@ scene::Obstacle obstacle_of(const hamelin_obstacle& given) {
   return out;
 }
 
+PointFrame frame_of(const hamelin_point_frame* given) {
+  const hamelin_point_frame full = complete(given, sizeof(hamelin_point_frame), "frame");
+  if (full.points > static_cast<std::size_t>(PointFrame::points_max))
+    throw Error(ErrorCode::invalid, fmt::format("points: {} given, expected 1 to {}", full.points,
+                                                PointFrame::points_max));
+  if (full.mount < HAMELIN_MOUNT_WORLD || full.mount > HAMELIN_MOUNT_TIP)
+    throw Error(ErrorCode::invalid,
+                "points: the sensor's mount is unknown, expected the world, the base or the tip");
+  PointFrame out;
+  out.points = Eigen::Map<const Eigen::Matrix3Xf>(required(full.points_m, "frame: points_m"), 3,
+                                                  static_cast<Eigen::Index>(full.points));
+  out.sensor = pose_of(full.position_m, full.quaternion_wxyz);
+  out.mount = static_cast<scene::Mount>(full.mount);
+  out.time_s = full.time_s;
+  if (full.range_m != 0.0) out.range_m = full.range_m;
+  return out;
+}
+
 }  // namespace
 
 extern "C" {
@@ -113,6 +131,21 @@ std::int32_t hamelin_controller_set_map_json(hamelin_controller* controller, con
     if (map_json != nullptr)
       map = scene::map_from_json(json_of(map_json, "map_json"), folder_of(of, folder), "map");
     return of.controller.world().set_map(map, at);
+  });
+}
+
+std::int32_t hamelin_controller_insert_points(hamelin_controller* controller,
+                                              const hamelin_point_frame* given,
+                                              hamelin_frame_report* report, char* error,
+                                              std::size_t error_size) {
+  return guarded(controller, error, error_size, [&](hamelin_controller& of) {
+    if (report != nullptr && report->struct_size < sizeof(hamelin_frame_report))
+      refuse_size("report");
+    const FrameReport made = of.controller.world().insert_points(frame_of(given));
+    if (report == nullptr) return;
+    write_struct({0, made.snapshot, made.points, made.on_arm, made.on_obstacles, made.occupied,
+                  made.cleared},
+                 report);
   });
 }
 

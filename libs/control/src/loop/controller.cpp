@@ -127,6 +127,7 @@ void Controller::measure(double time_s, const VectorXd& q, const VectorXd& v) {
     for (Eigen::Index i = 0; i < dof; ++i)
       measured_[static_cast<std::size_t>(i)].store(q[i], std::memory_order_relaxed);
   // where the clock is broken for good, the arm is brought to rest by what is measured
+  if (usable_) world_.note_posture(time_s_, q, answer_.load);
   arm_->drive->measure(q, v, finite && (in_order || unusable_ > options_.lost_measurements_max));
 }
 

@@ -176,6 +176,7 @@ std::uint64_t Controller::publish_load(std::vector<scene::Payload> all, const Ve
                     q.size(), nominal_.dof(), nominal_.robot().name));
   model::Model model = model_carrying(all, q);
   check_size(all, model, world_);
+  world_.note_load(load_number_ + 1, model);
   publish_arm(load_number_ + 1, 0, std::move(model), q);
   if (used_load_.load() == load_number_) accepted_ = attached_;
   attached_ = std::move(all);

@@ -9,10 +9,22 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/text.hpp"
 #include "loop/newest.hpp"
+#include "world/posture_history.hpp"
+#include "world/sensed_map.hpp"
 
 namespace hamelin::control {
 
 namespace {
+
+// Leaves nothing of a map but its voxels.
+void hide(scene::MapSpec& map) {
+  map.resolution_m = scene::read_map(map, {}).resolution;
+  map.file.clear();
+  map.known = true;
+}
+
+// Two seconds at 1 kHz.
+constexpr std::size_t postures_kept = 2048;
 
 void check_finite(std::string_view name, const geometry::SE3& pose) {
   if (!pose.p().allFinite() || !pose.R().allFinite())
@@ -124,7 +136,10 @@ World::View& World::take() noexcept {
 }
 
 World::World(const scene::Scene& scene, const model::Model& model, const Options& options)
-    : options_(options), scene_(scene), model_(model) {
+    : options_(options),
+      scene_(scene),
+      model_(model),
+      postures_(std::make_unique<PostureHistory>(model.dof(), postures_kept)) {
   check(options_.observations);
   if (!(std::isfinite(options_.payload_reach_m) && options_.payload_reach_m >= 0.0))
     throw Error(ErrorCode::invalid,
@@ -152,6 +167,7 @@ scene::Environment World::make_environment(const std::optional<scene::MapSpec>& 
   scene::Scene scene = scene_;
   scene.map = map;
   if (scene.map) scene.map->changes.clear();
+  if (scene.map && !scene.map->known) hide(*scene.map);
   scene.start_q = q;
   return scene::make_environment(scene, model_, options_.influence_m + options_.payload_reach_m);
 }
@@ -296,15 +312,23 @@ std::uint64_t World::remove_obstacle(std::string_view name) {
 std::uint64_t World::set_map(const std::optional<scene::MapSpec>& map, const Eigen::VectorXd& q) {
   // Reading a map may take long: other updates need not wait for it.
   const scene::Environment environment = make_environment(map, q.size() > 0 ? q : scene_.start_q);
-  const std::lock_guard lock(mutex_);
-  return publish(environment.with_obstacles(latest_->environment.obstacles()),
-                 latest_->obstacle_ids, Changes::standing);
+  const std::lock_guard map_lock(map_mutex_);
+  sensed_.reset();
+  return publish_map(environment);
 }
 
 std::uint64_t World::change_map(const scene::MapChangeSpec& change) {
+  const std::lock_guard map_lock(map_mutex_);
+  const scene::Environment environment = latest()->environment.with_change(change);
+  sensed_.reset();
+  return publish_map(environment);
+}
+
+std::uint64_t World::publish_map(const scene::Environment& environment) {
+  if (options_.prepare) environment.prepare();
   const std::lock_guard lock(mutex_);
-  return publish(latest_->environment.with_change(change), latest_->obstacle_ids,
-                 Changes::standing);
+  return publish(environment.with_obstacles(latest_->environment.obstacles()),
+                 latest_->obstacle_ids, Changes::standing);
 }
 
 std::shared_ptr<const WorldSnapshot> World::latest() const {

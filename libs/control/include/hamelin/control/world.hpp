@@ -11,12 +11,15 @@
 #include <vector>
 
 #include "hamelin/control/motion_estimator.hpp"
+#include "hamelin/control/point_frame.hpp"
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/scene.hpp"
 
 namespace hamelin::control {
 
+class PostureHistory;
+class SensedMap;
 template <class T>
 class Newest;
 
@@ -95,6 +98,23 @@ class World {
   /// @throws Error io, parse or invalid, also if there is no map
   std::uint64_t change_map(const scene::MapChangeSpec& change);
 
+  /// Takes what a depth sensor saw into the map: points that were on the arm, its load or an
+  /// obstacle of the world are left out, rays to the others free the voxels that they pass, and the points occupy theirs,
+  /// docs/theory.md (20.1). What all frames since set_map() or change_map() told is kept; before
+  /// them, the map is as sure as scene::PointsSpec lets it be.
+  /// Takes some 25 ms for 320 × 240 points; other updates than those of the map need not wait.
+  /// @throws Error invalid, "points: …", for a frame that check() refuses, if there is no map, for
+  ///         a time that is after that of the last tick by more than 10 ms or before it by more
+  ///         than scene::PointsSpec::age_max_s, and for a sensor that is in an occupied voxel; nothing
+  ///         changes then
+  FrameReport insert_points(const PointFrame& frame);
+
+  /// Where the arm is, and with which load, see note_load(). For the thread of the control loop:
+  /// never waits, never allocates.
+  void note_posture(double time_s, const Eigen::VectorXd& q, std::uint64_t load) noexcept;
+  /// The model of the arm with a load; that of load 0 is the one that the world was made with.
+  void note_load(std::uint64_t load, model::Model model);
+
   /// The newest snapshot, for queries on any thread but that of the control loop: this locks, but
   /// never for longer than it takes to copy a pointer.
   [[nodiscard]] std::shared_ptr<const WorldSnapshot> latest() const;
@@ -124,6 +144,11 @@ class World {
   enum class Changes { standing, moving };
   std::uint64_t publish(scene::Environment environment, std::vector<std::int32_t> ids,
                         Changes changes);
+  /// Publishes an environment with another map. The caller has locked map_mutex_.
+  std::uint64_t publish_map(const scene::Environment& environment);
+  /// Arms at the time of a frame, one for each posture that may be the one.
+  struct SeenArm;
+  [[nodiscard]] SeenArm arm_seen_by(const PointFrame& frame, const scene::PointsSpec& spec) const;
   /// The stream of an obstacle after an observation that continues or begins it.
   [[nodiscard]] MotionEstimator followed(const scene::Obstacle& obstacle, std::int32_t id,
                                          const Observation& observation) const;
@@ -134,7 +159,9 @@ class World {
   scene::Scene scene_;  ///< name, base and start
   const model::Model& model_;
   std::size_t contacts_max_ = 0;
-  std::mutex mutex_;                 ///< among writers; the control loop never takes it
+  // The control loop takes none of these.
+  std::mutex map_mutex_;             ///< among writers of the map; taken before `mutex_`
+  std::mutex mutex_;                 ///< among writers
   mutable std::mutex latest_mutex_;  ///< of `latest_`, which only writers change
   std::int32_t next_id_ = 0;
   std::map<std::int32_t, MotionEstimator> streams_;  ///< of observed poses, by the obstacle's id
@@ -142,6 +169,10 @@ class World {
   std::vector<std::pair<std::string, std::int32_t>> reserved_;
   std::shared_ptr<const WorldSnapshot> latest_;
   std::unique_ptr<Newest<View>> newest_;
+  std::unique_ptr<SensedMap> sensed_;  ///< none: nothing was seen since the map was set or changed
+  std::unique_ptr<PostureHistory> postures_;
+  mutable std::mutex loads_mutex_;
+  std::map<std::uint64_t, std::shared_ptr<const model::Model>> loads_;  ///< the last few
 };
 
 }  // namespace hamelin::control

@@ -108,6 +108,8 @@ class WorldView {
 
   /// Poses of the links at the configuration of the last look().
   [[nodiscard]] const dynamics::Workspace& poses() const noexcept { return poses_; }
+  /// The arm's shapes there, in the world.
+  [[nodiscard]] scene::Shapes arm() const noexcept { return arm_.view(); }
 
   /// Clearance to all obstacles, also those that the planner is not shown; at most the influence
   /// [m].

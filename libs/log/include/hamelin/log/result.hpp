@@ -142,6 +142,14 @@ struct Result {
     std::optional<double> length;  ///< of the last path [rad or m]
   };
   std::optional<Guide> guide;
+  /// What the scene's sensors showed the controller.
+  struct Sensors {
+    long frames = 0, refused = 0;
+    std::size_t points = 0;                 ///< that became part of its map
+    std::size_t on_arm = 0;                 ///< left out: on the arm or its load
+    std::size_t occupied = 0, cleared = 0;  ///< voxels, each time
+  };
+  std::optional<Sensors> sensors;
   /// A plant other than hamelin's own, with the contacts that it and the judge counted.
   struct Plant {
     std::string type, version;

@@ -47,6 +47,9 @@ struct CutOut {
   std::size_t leaves = 0;   ///< how many cells lost any voxel
 };
 
+/// How many voxels disjoint boxes have.
+[[nodiscard]] std::size_t voxels_in(const std::vector<VoxelBox>& boxes);
+
 /// Removes the voxels that touch any of the capsules. Cells are split as far as needed.
 /// @throws Error invalid if that makes more than 2²² additional cells: the voxels are far too fine
 ///        for such capsules

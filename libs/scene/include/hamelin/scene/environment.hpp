@@ -176,6 +176,9 @@ class Environment {
   /// used. Queries may run on this environment at the same time.
   /// @throws Error io, parse or invalid, also if there is no map to change
   [[nodiscard]] Environment with_change(const MapChangeSpec& change) const;
+  /// The same for a change in voxels, of which those beyond map_ball() do not matter.
+  /// @throws Error invalid if there is no map to change
+  [[nodiscard]] Environment with_change(const MapChange& change) const;
   /// Computes now what the first query inside the map would compute, so that queries neither
   /// allocate nor wait.
   void prepare() const;
@@ -202,6 +205,10 @@ class Environment {
   [[nodiscard]] const MapField& unknown_field() const noexcept { return *unknown_; }
   /// Pose of the map's frame in the world; map_field() is in that frame.
   [[nodiscard]] const geometry::SE3& map_pose() const noexcept { return map_pose_; }
+  /// The map as given, without its changes; none if there is none.
+  [[nodiscard]] const std::optional<MapSpec>& map_spec() const noexcept { return map_spec_; }
+  /// What was kept of the map, in its frame [m]; of radius zero without a map.
+  [[nodiscard]] const Ball& map_ball() const noexcept { return map_ball_; }
   [[nodiscard]] const Summary& summary() const noexcept { return summary_; }
 
  private:
@@ -221,6 +228,7 @@ class Environment {
   [[nodiscard]] static double clearance_to(const Obstacle& obstacle, const Shapes& arm,
                                            const Placed& at, double limit);
 
+  void require_map() const;
   void read_changes(std::span<const MapChangeSpec> changes);
   /// Applies one change to fields that no other environment shares.
   MapField::Changed apply(const MapChange& change);

@@ -21,9 +21,22 @@ enum class UnknownPolicy : std::int32_t { free, slow, block };
 
 [[nodiscard]] std::string_view to_string(UnknownPolicy policy) noexcept;
 
+/// How the points of depth sensors change a map.
+struct PointsSpec {
+  /// Points this near to the arm, its load or a known obstacle are left out.
+  double margin_m = 0.03;
+  double time_error_s = 0.0;   ///< by which the time of a frame may be wrong, either way
+  double age_max_s = 0.5;      ///< frames that come later after they were seen are refused
+  /// That a voxel is occupied, as probabilities: by one point, by one ray that passes it, and by
+  /// all together at least and at most. By these, one point occupies, and three rays free.
+  double hit = 0.7, miss = 0.4, least = 0.4, most = 0.75;
+};
+
 /// A map as given in a scene.
 struct MapSpec {
-  std::filesystem::path file;
+  std::filesystem::path file;  ///< empty: nothing is known, see resolution_m
+  /// Edge of a voxel of a map without a file [m].
+  double resolution_m = 0.01;
   geometry::SE3 pose;                              ///< of the map's frame in the world
   Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};  ///< see Quaternion
   std::optional<double> scale;                     ///< metres per unit of the file
@@ -33,7 +46,10 @@ struct MapSpec {
   /// If given, the map contains the robot itself: voxels are removed that touch its shapes at the
   /// start, with radii increased by this [m].
   std::optional<double> self_filter_padding_m;
+  /// Whether a controller is shown it; else it knows nothing at first, and sensors see the map.
+  bool known = true;
   std::vector<MapChangeSpec> changes;  ///< in the order of their times
+  PointsSpec points;
 };
 
 /// The padding of a self-filter if the scene gives none [m].
@@ -88,6 +104,10 @@ struct MapRegion {
   std::vector<Cell> unknown;   ///< likewise; empty where unknown space is free
   MapSummary summary;
 };
+
+/// The map of a scene, or one in which all of a ball is unknown if it has no file.
+/// @throws Error as the other read_map(); invalid for a resolution that is not above 0
+[[nodiscard]] MapData read_map(const MapSpec& map, const Ball& ball);
 
 /// Reads a map and reduces it to what an arm can come near: shares within reach, crop, self-filter,
 /// unknown space by its policy, keep-out around the base.

@@ -16,6 +16,7 @@
 #include "hamelin/scene/motion.hpp"
 #include "hamelin/scene/obstacles.hpp"
 #include "hamelin/scene/payload.hpp"
+#include "hamelin/scene/sensors.hpp"
 
 namespace hamelin::scene {
 
@@ -226,6 +227,7 @@ struct Scene {
   std::vector<Goal> goals;
   std::optional<MapSpec> map;
   std::vector<Obstacle> obstacles;
+  std::vector<SensorSpec> sensors;
   std::vector<Event> events;  ///< happen in this order
   ModelFlags model;
   Actuation actuation;

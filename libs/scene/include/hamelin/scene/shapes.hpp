@@ -54,4 +54,16 @@ class PlacedShapes {
   std::vector<double> radii_;
 };
 
+/// The collision shapes of a robot's fixed base, in the world.
+class BaseShapes {
+ public:
+  explicit BaseShapes(const model::Model& model);
+
+  [[nodiscard]] Shapes view() const noexcept { return {centers_, radii_, half_axes_}; }
+
+ private:
+  std::vector<Eigen::Vector3d> centers_, half_axes_;
+  std::vector<double> radii_;
+};
+
 }  // namespace hamelin::scene

@@ -53,6 +53,10 @@ class OccupancyGrid {
                               const Eigen::Vector3f& origin,
                               double range_m = std::numeric_limits<double>::infinity());
 
+  /// Makes the part of a box that is within box() as well known as all measurements together can
+  /// make it, or unknown.
+  void set(const scene::VoxelBox& box, State state);
+
   [[nodiscard]] State state(const Voxel& voxel) const;
   /// log(p/(1 − p)) for the probability p that it is occupied; NaN if nothing is known of it.
   [[nodiscard]] float log_odds(const Voxel& voxel) const;
@@ -82,6 +86,10 @@ class OccupancyGrid {
   void apply();
   /// Changes the log-odds of a row's voxels. @return those that are occupied now
   std::uint64_t update(std::size_t word, std::uint64_t free, std::uint64_t occupied);
+  /// The log-odds of a voxel that no frame has told about.
+  [[nodiscard]] float value_of(std::size_t word, std::uint64_t bit) const noexcept;
+  /// Sets those of `mask`.
+  void set(std::size_t word, std::uint64_t mask, State state);
   [[nodiscard]] Voxel first_of(std::size_t word) const noexcept;
   [[nodiscard]] std::size_t block_of(const Voxel& first) const noexcept;
 

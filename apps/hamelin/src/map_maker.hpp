@@ -6,7 +6,7 @@
 
 #include "hamelin/scene/map_file.hpp"
 
-namespace hamelin::sensing {
+namespace hamelin::app {
 
 /// Makes an OctoMap of frames of points by the library itself, of any extent: what an OccupancyGrid
 /// knows of the same frames, as a file.
@@ -33,4 +33,4 @@ class MapMaker {
   std::unique_ptr<Tree> tree_;
 };
 
-}  // namespace hamelin::sensing
+}  // namespace hamelin::app

@@ -1,4 +1,4 @@
-#include "hamelin/sensing/map_maker.hpp"
+#include "map_maker.hpp"
 
 #include <fmt/format.h>
 #include <octomap/octomap.h>
@@ -7,9 +7,8 @@
 #include <sstream>
 
 #include "hamelin/core/error.hpp"
-#include "ray.hpp"
 
-namespace hamelin::sensing {
+namespace hamelin::app {
 
 using Eigen::Index;
 
@@ -19,6 +18,14 @@ struct MapMaker::Tree {
 };
 
 namespace {
+
+// Voxels along each axis that there are keys for: from minus this up.
+constexpr int key_limit = 32768;
+
+bool has_key(const Eigen::Vector3f& p, double voxels_per_m) {
+  const Eigen::Array3d voxel = (voxels_per_m * p.cast<double>().array()).floor();
+  return (voxel >= -key_limit).all() && (voxel < key_limit).all();
+}
 
 [[noreturn]] void refuse_map(const std::string& what) {
   throw Error(ErrorCode::invalid, "map of points: " + what);
@@ -83,4 +90,4 @@ std::string MapMaker::bytes(scene::MapFormat format) {
   return out.str();
 }
 
-}  // namespace hamelin::sensing
+}  // namespace hamelin::app

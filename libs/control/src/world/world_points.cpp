@@ -1,0 +1,188 @@
+// What depth sensors see becomes part of the map.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "hamelin/control/world.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/sensing/self_filter.hpp"
+#include "world/posture_history.hpp"
+#include "world/sensed_map.hpp"
+
+namespace hamelin::control {
+
+using Eigen::Matrix3Xf;
+
+namespace {
+
+// Frames may be seen after the last tick by as much [s].
+constexpr double ahead_max_s = 0.010;
+// Between two postures that a frame's time leaves possible an arm moves little [s].
+constexpr double posture_step_s = 0.005;
+// More loads than an arm takes and leaves while frames are on their way.
+constexpr std::size_t loads_kept = 16;
+
+[[noreturn]] void refuse(const std::string& what) {
+  throw Error(ErrorCode::invalid, "points: " + what);
+}
+
+void transform(const geometry::SE3& pose, Matrix3Xf& points) {
+  const Eigen::Matrix3f R = pose.R().cast<float>();
+  const Eigen::Vector3f p = pose.p().cast<float>();
+  points = ((R * points).colwise() + p).eval();
+}
+
+// Pose in the world of what carries the sensor, after dynamics::forward_kinematics.
+geometry::SE3 mount_of(scene::Mount mount, const model::Model& model,
+                       const dynamics::Workspace& ws) {
+  switch (mount) {
+    case scene::Mount::world:
+      return {};
+    case scene::Mount::base:
+      return model.base();
+    case scene::Mount::tip:
+      return dynamics::tip_pose(model, ws);
+  }
+  refuse("the sensor's mount is unknown, expected the world, the base or the tip");
+}
+
+// Moves points that are not on the arm, in none of its postures, to the front.
+Eigen::Index remove_arms(const model::Model& model, const std::vector<Eigen::VectorXd>& postures,
+                         double margin_m, dynamics::Workspace& ws, Matrix3Xf& points) {
+  Eigen::Index kept = points.cols();
+  const auto remove = [&](const scene::Shapes& shapes) {
+    kept = sensing::remove_arm(shapes, margin_m, points.leftCols(kept));
+  };
+  scene::PlacedShapes arm(model);
+  for (const Eigen::VectorXd& q : postures) {
+    dynamics::forward_kinematics(model, ws, q);
+    arm.place(model, ws);
+    remove(arm.view());
+  }
+  remove(scene::BaseShapes(model).view());
+  return kept;
+}
+
+// Moves points that are not on an obstacle, at their time, to the front.
+Eigen::Index remove_obstacles(const scene::Environment& environment, double time_s,
+                              double margin_m, Eigen::Ref<Matrix3Xf> points) {
+  Eigen::Index kept = points.cols();
+  for (const scene::Obstacle& obstacle : environment.obstacles()) {
+    if (obstacle.shape == scene::Shape::frame || !scene::exists(obstacle, time_s)) continue;
+    const geometry::SE3 pose = scene::placed_at(obstacle, time_s).pose;
+    const double reach = scene::bounding_radius(obstacle) + margin_m;
+    const auto on = [&](const Eigen::Vector3d& p) {
+      return (p - pose.p()).squaredNorm() <= reach * reach &&
+             scene::closest_on(obstacle, pose, p).distance <= margin_m;
+    };
+    Eigen::Index rest = 0;
+    for (Eigen::Index i = 0; i < kept; ++i)
+      if (!on(points.col(i).cast<double>())) points.col(rest++) = points.col(i);
+    kept = rest;
+  }
+  return kept;
+}
+
+}  // namespace
+
+struct World::SeenArm {
+  std::shared_ptr<const model::Model> model;
+  std::vector<Eigen::VectorXd> postures;  ///< the first is that of the time itself
+};
+
+void World::note_posture(double time_s, const Eigen::VectorXd& q, std::uint64_t load) noexcept {
+  postures_->record(time_s, q, load);
+}
+
+void World::note_load(std::uint64_t load, model::Model model) {
+  const std::lock_guard lock(loads_mutex_);
+  loads_.insert_or_assign(load, std::make_shared<const model::Model>(std::move(model)));
+  while (loads_.size() > loads_kept) loads_.erase(loads_.begin());
+}
+
+World::SeenArm World::arm_seen_by(const PointFrame& frame, const scene::PointsSpec& spec) const {
+  const auto newest = postures_->newest();
+  // before the first tick the arm is at the start
+  if (!newest) {
+    const bool given = scene_.start_q.size() > 0;
+    return {std::make_shared<const model::Model>(model_),
+            {given ? scene_.start_q : Eigen::VectorXd(Eigen::VectorXd::Zero(model_.dof()))}};
+  }
+  const double age_s = newest->time_s - frame.time_s;
+  if (age_s < -ahead_max_s)
+    refuse(fmt::format("seen at {} s, expected at most {} s after the last tick at {} s",
+                       frame.time_s, ahead_max_s, newest->time_s));
+  const auto at_time = age_s <= spec.age_max_s ? postures_->at(frame.time_s) : std::nullopt;
+  if (!at_time)
+    refuse(fmt::format("seen at {} s, {:.3g} s before the last tick, expected at most {} s, and "
+                       "that the arm's posture then is known",
+                       frame.time_s, age_s, spec.age_max_s));
+  SeenArm seen;
+  {
+    const std::lock_guard lock(loads_mutex_);
+    const auto load = loads_.find(at_time->load);
+    if (load != loads_.end())
+      seen.model = load->second;
+    else if (at_time->load == 0)
+      seen.model = std::make_shared<const model::Model>(model_);
+    else
+      refuse(fmt::format("seen at {} s, expected a later time: what the arm carried then is gone",
+                         frame.time_s));
+  }
+  seen.postures.push_back(at_time->q);
+  const int steps = static_cast<int>(std::ceil(spec.time_error_s / posture_step_s));
+  for (int k = 1; k <= steps; ++k)
+    for (const double way_s : {-spec.time_error_s, spec.time_error_s})
+      if (const auto other = postures_->at(frame.time_s + way_s * k / steps))
+        seen.postures.push_back(other->q);
+  return seen;
+}
+
+FrameReport World::insert_points(const PointFrame& frame) {
+  check(frame);
+  const std::lock_guard map_lock(map_mutex_);
+  const scene::Environment environment = latest()->environment;
+  const auto& map = environment.map_spec();
+  if (!map)
+    refuse("there is no map, expected one, if only {\"resolution_m\": 0.01}, where nothing is known");
+  const SeenArm seen = arm_seen_by(frame, map->points);
+  const model::Model& model = *seen.model;
+  dynamics::Workspace ws(model);
+  dynamics::forward_kinematics(model, ws, seen.postures.front());
+  const geometry::SE3 sensor = mount_of(frame.mount, model, ws) * frame.sensor;
+  Matrix3Xf points = frame.points;
+  transform(sensor, points);
+  FrameReport report;
+  const auto keep = [&](Eigen::Index kept) {
+    const Eigen::Index removed = points.cols() - kept;
+    points.conservativeResize(3, kept);
+    return static_cast<std::size_t>(removed);
+  };
+  const double margin_m = map->points.margin_m;
+  report.on_arm = keep(remove_arms(model, seen.postures, margin_m, ws, points));
+  report.on_obstacles = keep(remove_obstacles(environment, frame.time_s, margin_m, points));
+  report.points = static_cast<std::size_t>(points.cols());
+  const geometry::SE3 map_from_world = environment.map_pose().inverse();
+  transform(map_from_world, points);
+  const Eigen::Vector3d origin = map_from_world * sensor.p();
+
+  if (!sensed_)
+    sensed_ = std::make_unique<SensedMap>(
+        environment, sensing::SensorModel{map->points.hit, map->points.miss, map->points.least,
+                                          map->points.most, 0.5});
+  if (sensed_->occupied(origin))
+    refuse(fmt::format("seen from ({:.4g}, {:.4g}, {:.4g}) m in the map, which is occupied, "
+                       "expected a sensor in free or unknown space",
+                       origin.x(), origin.y(), origin.z()));
+  const scene::MapChange change = sensed_->insert(points, origin, frame.range_m);
+  report.snapshot = latest()->number;
+  if (change.free.empty() && change.occupied.empty()) return report;
+  report.occupied = scene::voxels_in(change.occupied);
+  report.cleared = scene::voxels_in(change.free);
+  report.snapshot = publish_map(environment.with_change(change));
+  return report;
+}
+
+}  // namespace hamelin::control
