@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <variant>
 
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/control/world.hpp"
@@ -253,6 +254,46 @@ TEST_CASE("points on a known obstacle do not become part of the map", "[control]
   const control::FrameReport report = room.world->insert_points(wall_at(0.6, 1.0));
   CHECK(report.on_obstacles > 100);
   CHECK(report.on_obstacles + report.points == 400);
+}
+
+TEST_CASE("a ball that moves becomes an obstacle with its velocity, and the map stays empty",
+          "[control][points]") {
+  Room room(scene::UnknownPolicy::free, 0.02);
+  sensing::DepthCamera camera;
+  camera.width = 120;
+  camera.height = 90;
+  camera.noise_m = 0.002;
+  sensing::DepthRenderer renderer(camera);
+  const geometry::SE3 at = look({1.5, 0.0, 1.2}, {0.0, 0.0, 0.9});
+  Rng rng(5);
+  sensing::DepthRenderer::Solid ball;
+  ball.shape.radius_m = 0.12;
+  const auto center = [](double t) { return Vector3d(0.5, -0.6 + 0.5 * t, 0.9); };
+  std::size_t movers = 0;
+  double time_s = 0.0;
+  for (int k = 0; k <= 40; ++k) {
+    time_s = k / 20.0;
+    room.world->note_posture(time_s, room.scene.start_q, 0);
+    ball.pose = {Eigen::Matrix3d::Identity(), center(time_s)};
+    control::PointFrame frame;
+    // the ball comes into a room that was seen to be free
+    frame.points = renderer.render(at, k < 3 ? std::vector<sensing::DepthRenderer::Solid>{}
+                                             : std::vector{ball},
+                                   rng);
+    frame.sensor = at;
+    frame.time_s = time_s;
+    frame.range_m = camera.range_m;
+    movers += room.world->insert_points(frame).movers;
+  }
+  CHECK(movers > 25);
+  REQUIRE(room.environment().obstacles().size() == 1);
+  const scene::Obstacle& found = room.environment().obstacles()[0];
+  CHECK_THAT(found.name, Contains("mover 0."));
+  const auto motion = std::get<scene::ObservedMotion>(*found.motion);
+  CHECK((motion.velocity_m_s - Vector3d(0.0, 0.5, 0.0)).norm() < 0.1);
+  CHECK((found.pose.p() - center(time_s)).norm() < 0.06);
+  // what it left behind is free again
+  CHECK(room.distance(center(time_s - 1.0)) > 0.2);
 }
 
 TEST_CASE("a sensor on the tip sees from where the tip was", "[control][points]") {

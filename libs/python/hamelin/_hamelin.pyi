@@ -503,6 +503,7 @@ class World:
         *,
         time: float,
         mount: str = ...,
+        source: int = ...,
         range: float = ...,
     ) -> dict[str, int]: ...
     @property

@@ -125,8 +125,9 @@ void add_world(py::module_& module) {
       .def(
           "insert_points",
           [](const BoundWorld& w, const Points& points, py::handle pose, double time_s,
-             const std::string& mount, double range_m) {
-            const control::PointFrame frame = frame_of(points, pose, time_s, mount, range_m);
+             const std::string& mount, std::int32_t source, double range_m) {
+            control::PointFrame frame = frame_of(points, pose, time_s, mount, range_m);
+            frame.source = source;
             control::FrameReport report;
             {
               const py::gil_scoped_release unlocked;
@@ -137,17 +138,19 @@ void add_world(py::module_& module) {
             out["points"] = report.points;
             out["on_arm"] = report.on_arm;
             out["on_obstacles"] = report.on_obstacles;
+            out["movers"] = report.movers;
             out["occupied"] = report.occupied;
             out["cleared"] = report.cleared;
             return out;
           },
           arg("points"), arg("pose"), py::kw_only(), arg("time"), arg("mount") = "world",
-          arg("range") = std::numeric_limits<double>::infinity(),
+          arg("source") = 0, arg("range") = std::numeric_limits<double>::infinity(),
           "Makes what a depth sensor saw part of the map, which must exist. points: shape (N, 3),\n"
           "in the sensor's frame, finite [m]. pose: of the sensor in the frame of its mount,\n"
-          "\"world\", \"base\" or \"tip\", shape (4, 4). time: when they were seen [s]. range: of\n"
-          "points that are farther only the way up to there is free [m]. Points on the arm, its\n"
-          "load or a known obstacle are left out, and rays to the others free what they pass.\n"
+          "\"world\", \"base\" or \"tip\", shape (4, 4). time: when they were seen [s]. source:\n"
+          "the same for all frames of a sensor. range: of points that are farther only the way up\n"
+          "to there is free [m]. Points on the arm, its load or a known obstacle are left out, rays\n"
+          "to the others free what they pass, and bodies that move become obstacles.\n"
           "Returns the number of the snapshot that knows the frame, and counts of points and\n"
           "voxels.")
       .def_property_readonly(

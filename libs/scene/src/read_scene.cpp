@@ -526,6 +526,7 @@ PointsSpec read_points_spec(const Reader& in) {
                             {"least", &points.least},
                             {"most", &points.most}})
     *value = in.get(key, *value);
+  points.movers = in.get("movers", points.movers);
   if (points.least > points.most)
     in.fail("least", fmt::format("{} is above most, {}", points.least, points.most));
   return points;

@@ -119,6 +119,7 @@ Json map_json(const MapSpec& map) {
   out["points"] = {{"margin_m", points.margin_m},
                    {"time_error_s", points.time_error_s},
                    {"age_max_s", points.age_max_s},
+                   {"movers", points.movers},
                    {"hit", points.hit},
                    {"miss", points.miss},
                    {"least", points.least},

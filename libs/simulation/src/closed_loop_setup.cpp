@@ -91,7 +91,9 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
 
 control::Controller::Options ClosedLoop::controller_options() {
   control::Controller::Options options;
-  options.obstacles_max = 0;  // no more than the scene's
+  // no more than the scene's, and bodies that sensors follow
+  constexpr std::size_t bodies_max = 16;
+  options.obstacles_max = scene_.sensors.empty() ? 0 : scene_.obstacles.size() + bodies_max;
   options.prepare_maps = false;
   options.fixed_world = scene_.sensors.empty();
   options.path_points_max = 0;   // no more than the scene's

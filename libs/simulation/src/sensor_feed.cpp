@@ -40,6 +40,7 @@ control::PointFrame SensorFeed::look(Camera& camera, double time_s, control::Wor
   control::PointFrame frame;
   frame.sensor = camera.spec.pose;
   frame.mount = camera.spec.mount;
+  frame.source = static_cast<std::int32_t>(&camera - cameras_.data());
   frame.time_s = time_s;
   frame.range_m = camera.spec.range_m;
   geometry::SE3 pose = camera.spec.pose;

@@ -47,6 +47,7 @@ PointFrame frame_of(const hamelin_point_frame* given) {
                                                   static_cast<Eigen::Index>(full.points));
   out.sensor = pose_of(full.position_m, full.quaternion_wxyz);
   out.mount = static_cast<scene::Mount>(full.mount);
+  out.source = full.source;
   out.time_s = full.time_s;
   if (full.range_m != 0.0) out.range_m = full.range_m;
   return out;
@@ -143,8 +144,8 @@ std::int32_t hamelin_controller_insert_points(hamelin_controller* controller,
       refuse_size("report");
     const FrameReport made = of.controller.world().insert_points(frame_of(given));
     if (report == nullptr) return;
-    write_struct({0, made.snapshot, made.points, made.on_arm, made.on_obstacles, made.occupied,
-                  made.cleared},
+    write_struct({0, made.snapshot, made.points, made.on_arm, made.on_obstacles, made.movers,
+                  made.occupied, made.cleared},
                  report);
   });
 }

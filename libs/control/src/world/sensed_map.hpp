@@ -1,5 +1,8 @@
 #pragma once
 #include <Eigen/Core>
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
 
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/sensing/occupancy_grid.hpp"
@@ -15,17 +18,29 @@ class SensedMap {
   /// Whether a point of the map's frame is in an occupied voxel.
   [[nodiscard]] bool occupied(const Eigen::Vector3d& p) const;
 
+  /// Per point of the map's frame: whether it is where nothing stood for long, and what does is not
+  /// next to it.
+  [[nodiscard]] std::vector<std::uint8_t> loose(const Eigen::Ref<const Eigen::Matrix3Xf>& points,
+                                                double time_s) const;
+
   /// Takes a frame, see OccupancyGrid::insert(). @return what changes in the map
   [[nodiscard]] scene::MapChange insert(const Eigen::Ref<const Eigen::Matrix3Xf>& points,
-                                        const Eigen::Vector3d& origin, double range_m);
+                                        const Eigen::Vector3d& origin, double range_m,
+                                        double time_s);
 
  private:
+  using Voxel = sensing::OccupancyGrid::Voxel;
+  [[nodiscard]] Voxel voxel_of(const Eigen::Vector3d& p) const;
+  /// Whether something stands there, and has for long.
+  [[nodiscard]] bool stands(const Voxel& voxel, double time_s) const;
+  void note_fresh(const sensing::OccupancyGrid::Row& row, double time_s);
   void add_runs(const sensing::OccupancyGrid::Row& row, std::uint64_t bits,
                 std::vector<scene::VoxelBox>& out) const;
 
   scene::Ball ball_;  ///< beyond which the map does not matter
   bool unknown_matters_;
   sensing::OccupancyGrid grid_;
+  std::unordered_map<std::uint64_t, double> fresh_;  ///< when voxels that were free became occupied
 };
 
 }  // namespace hamelin::control

@@ -11,6 +11,7 @@
 #include "loop/newest.hpp"
 #include "world/posture_history.hpp"
 #include "world/sensed_map.hpp"
+#include "world/sensed_movers.hpp"
 
 namespace hamelin::control {
 
@@ -139,6 +140,7 @@ World::World(const scene::Scene& scene, const model::Model& model, const Options
     : options_(options),
       scene_(scene),
       model_(model),
+      movers_(std::make_unique<SensedMovers>()),
       postures_(std::make_unique<PostureHistory>(model.dof(), postures_kept)) {
   check(options_.observations);
   if (!(std::isfinite(options_.payload_reach_m) && options_.payload_reach_m >= 0.0))

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "hamelin/control/world.hpp"
@@ -10,6 +11,7 @@
 #include "hamelin/sensing/self_filter.hpp"
 #include "world/posture_history.hpp"
 #include "world/sensed_map.hpp"
+#include "world/sensed_movers.hpp"
 
 namespace hamelin::control {
 
@@ -65,12 +67,16 @@ Eigen::Index remove_arms(const model::Model& model, const std::vector<Eigen::Vec
   return kept;
 }
 
-// Moves points that are not on an obstacle, at their time, to the front.
+// Moves points that are not on a known obstacle, at their time, to the front.
 Eigen::Index remove_obstacles(const scene::Environment& environment, double time_s,
-                              double margin_m, Eigen::Ref<Matrix3Xf> points) {
+                              double margin_m,
+                              const std::function<bool(const scene::Obstacle&)>& is_known,
+                              Eigen::Ref<Matrix3Xf> points) {
   Eigen::Index kept = points.cols();
   for (const scene::Obstacle& obstacle : environment.obstacles()) {
-    if (obstacle.shape == scene::Shape::frame || !scene::exists(obstacle, time_s)) continue;
+    if (obstacle.shape == scene::Shape::frame || !scene::exists(obstacle, time_s) ||
+        !is_known(obstacle))
+      continue;
     const geometry::SE3 pose = scene::placed_at(obstacle, time_s).pose;
     const double reach = scene::bounding_radius(obstacle) + margin_m;
     const auto on = [&](const Eigen::Vector3d& p) {
@@ -85,11 +91,24 @@ Eigen::Index remove_obstacles(const scene::Environment& environment, double time
   return kept;
 }
 
+void remove_taken(const std::vector<std::uint8_t>& taken, Matrix3Xf& points) {
+  Eigen::Index rest = 0;
+  for (std::size_t i = 0; i < taken.size(); ++i)
+    if (taken[i] == 0) points.col(rest++) = points.col(static_cast<Eigen::Index>(i));
+  if (!taken.empty()) points.conservativeResize(3, rest);
+}
+
 }  // namespace
 
 struct World::SeenArm {
   std::shared_ptr<const model::Model> model;
   std::vector<Eigen::VectorXd> postures;  ///< the first is that of the time itself
+};
+
+struct World::SeenPoints {
+  geometry::SE3 sensor;  ///< its pose in the world
+  Matrix3Xf points;      ///< in the world, without those on what is known
+  FrameReport report;
 };
 
 void World::note_posture(double time_s, const Eigen::VectorXd& q, std::uint64_t load) noexcept {
@@ -140,48 +159,66 @@ World::SeenArm World::arm_seen_by(const PointFrame& frame, const scene::PointsSp
   return seen;
 }
 
+World::SeenPoints World::seen_points(const PointFrame& frame,
+                                     const scene::Environment& environment) const {
+  const scene::PointsSpec& spec = environment.map_spec()->points;
+  const SeenArm seen = arm_seen_by(frame, spec);
+  const model::Model& model = *seen.model;
+  dynamics::Workspace ws(model);
+  dynamics::forward_kinematics(model, ws, seen.postures.front());
+  SeenPoints out{mount_of(frame.mount, model, ws) * frame.sensor, frame.points, {}};
+  transform(out.sensor, out.points);
+  const auto keep = [&](Eigen::Index kept) {
+    const Eigen::Index removed = out.points.cols() - kept;
+    out.points.conservativeResize(3, kept);
+    return static_cast<std::size_t>(removed);
+  };
+  out.report.on_arm = keep(remove_arms(model, seen.postures, spec.margin_m, ws, out.points));
+  const auto is_known = [&](const scene::Obstacle& obstacle) {
+    return !movers_->follows(frame.source, obstacle.name);
+  };
+  out.report.on_obstacles =
+      keep(remove_obstacles(environment, frame.time_s, spec.margin_m, is_known, out.points));
+  return out;
+}
+
 FrameReport World::insert_points(const PointFrame& frame) {
   check(frame);
   const std::lock_guard map_lock(map_mutex_);
   const scene::Environment environment = latest()->environment;
   const auto& map = environment.map_spec();
   if (!map)
-    refuse("there is no map, expected one, if only {\"resolution_m\": 0.01}, where nothing is known");
-  const SeenArm seen = arm_seen_by(frame, map->points);
-  const model::Model& model = *seen.model;
-  dynamics::Workspace ws(model);
-  dynamics::forward_kinematics(model, ws, seen.postures.front());
-  const geometry::SE3 sensor = mount_of(frame.mount, model, ws) * frame.sensor;
-  Matrix3Xf points = frame.points;
-  transform(sensor, points);
-  FrameReport report;
-  const auto keep = [&](Eigen::Index kept) {
-    const Eigen::Index removed = points.cols() - kept;
-    points.conservativeResize(3, kept);
-    return static_cast<std::size_t>(removed);
-  };
-  const double margin_m = map->points.margin_m;
-  report.on_arm = keep(remove_arms(model, seen.postures, margin_m, ws, points));
-  report.on_obstacles = keep(remove_obstacles(environment, frame.time_s, margin_m, points));
-  report.points = static_cast<std::size_t>(points.cols());
-  const geometry::SE3 map_from_world = environment.map_pose().inverse();
-  transform(map_from_world, points);
-  const Eigen::Vector3d origin = map_from_world * sensor.p();
-
+    refuse(
+        "there is no map, expected one, if only {\"resolution_m\": 0.01}, where nothing is known");
+  SeenPoints seen = seen_points(frame, environment);
+  FrameReport& report = seen.report;
   if (!sensed_)
     sensed_ = std::make_unique<SensedMap>(
         environment, sensing::SensorModel{map->points.hit, map->points.miss, map->points.least,
                                           map->points.most, 0.5});
+  const geometry::SE3 map_from_world = environment.map_pose().inverse();
+  const Eigen::Vector3d origin = map_from_world * seen.sensor.p();
   if (sensed_->occupied(origin))
     refuse(fmt::format("seen from ({:.4g}, {:.4g}, {:.4g}) m in the map, which is occupied, "
                        "expected a sensor in free or unknown space",
                        origin.x(), origin.y(), origin.z()));
-  const scene::MapChange change = sensed_->insert(points, origin, frame.range_m);
+  Matrix3Xf points = seen.points;
+  transform(map_from_world, points);
+  sensing::MoverTracker::Update moving;
+  if (map->points.movers) {
+    moving = movers_->take(frame, seen.sensor, seen.points, sensed_->loose(points, frame.time_s));
+    remove_taken(moving.taken, points);
+  }
+  report.movers = moving.movers.size();
+  report.points = static_cast<std::size_t>(points.cols());
   report.snapshot = latest()->number;
-  if (change.free.empty() && change.occupied.empty()) return report;
+  const scene::MapChange change = sensed_->insert(points, origin, frame.range_m, frame.time_s);
   report.occupied = scene::voxels_in(change.occupied);
   report.cleared = scene::voxels_in(change.free);
-  report.snapshot = publish_map(environment.with_change(change));
+  if (report.occupied + report.cleared > 0)
+    report.snapshot = publish_map(environment.with_change(change));
+  if (!moving.movers.empty() || !moving.gone.empty())
+    report.snapshot = movers_->tell(frame, moving, *this);
   return report;
 }
 

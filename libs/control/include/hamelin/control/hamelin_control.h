@@ -236,6 +236,7 @@ enum { HAMELIN_MOUNT_WORLD = 0, HAMELIN_MOUNT_BASE = 1, HAMELIN_MOUNT_TIP = 2 };
 typedef struct hamelin_point_frame {
   uint32_t struct_size;
   int32_t mount;         /* HAMELIN_MOUNT_... */
+  int32_t source;        /* the same for all frames of a sensor, another for each sensor */
   const float* points_m; /* x, y, z of each in the sensor's frame, finite */
   size_t points;         /* 1 to 2000000 */
   double position_m[3], quaternion_wxyz[4]; /* of the sensor, in the frame of its mount */
@@ -249,6 +250,7 @@ typedef struct hamelin_frame_report {
   uint64_t snapshot;             /* the first that knows the frame */
   uint64_t points;               /* that were used */
   uint64_t on_arm, on_obstacles; /* points that were left out */
+  uint64_t movers;               /* bodies that move, which it sees */
   uint64_t occupied, cleared;    /* voxels of the map */
 } hamelin_frame_report;
 

@@ -17,6 +17,7 @@ struct PointFrame {
   Eigen::Matrix3Xf points;  ///< 3 × N in the sensor's frame [m], finite
   geometry::SE3 sensor;     ///< pose of the sensor's frame in that of its mount
   scene::Mount mount = scene::Mount::world;
+  std::int32_t source = 0;  ///< the same for all frames of a sensor, another for each sensor
   double time_s = 0.0;      ///< when they were seen, on the clock of Controller::tick()
   /// Of points that are farther only the way up to there is free [m].
   double range_m = std::numeric_limits<double>::infinity();
@@ -28,6 +29,7 @@ struct FrameReport {
   std::size_t points = 0;                 ///< that were used
   std::size_t on_arm = 0;                 ///< left out: on the arm or its load
   std::size_t on_obstacles = 0;           ///< left out: on obstacles that the world knows
+  std::size_t movers = 0;                 ///< bodies that move, which it sees
   std::size_t occupied = 0, cleared = 0;  ///< voxels of the map
 };
 

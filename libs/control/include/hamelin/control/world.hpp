@@ -20,6 +20,7 @@ namespace hamelin::control {
 
 class PostureHistory;
 class SensedMap;
+class SensedMovers;
 template <class T>
 class Newest;
 
@@ -102,6 +103,7 @@ class World {
   /// obstacle of the world are left out, rays to the others free the voxels that they pass, and the points occupy theirs,
   /// docs/theory.md (20.1). What all frames since set_map() or change_map() told is kept; before
   /// them, the map is as sure as scene::PointsSpec lets it be.
+  /// Bodies that move become obstacles, "mover SOURCE.ID", which later frames move.
   /// Takes some 25 ms for 320 × 240 points; other updates than those of the map need not wait.
   /// @throws Error invalid, "points: …", for a frame that check() refuses, if there is no map, for
   ///         a time that is after that of the last tick by more than 10 ms or before it by more
@@ -149,6 +151,10 @@ class World {
   /// Arms at the time of a frame, one for each posture that may be the one.
   struct SeenArm;
   [[nodiscard]] SeenArm arm_seen_by(const PointFrame& frame, const scene::PointsSpec& spec) const;
+  /// What a frame tells of what is not known otherwise.
+  struct SeenPoints;
+  [[nodiscard]] SeenPoints seen_points(const PointFrame& frame,
+                                       const scene::Environment& environment) const;
   /// The stream of an obstacle after an observation that continues or begins it.
   [[nodiscard]] MotionEstimator followed(const scene::Obstacle& obstacle, std::int32_t id,
                                          const Observation& observation) const;
@@ -170,6 +176,7 @@ class World {
   std::shared_ptr<const WorldSnapshot> latest_;
   std::unique_ptr<Newest<View>> newest_;
   std::unique_ptr<SensedMap> sensed_;  ///< none: nothing was seen since the map was set or changed
+  std::unique_ptr<SensedMovers> movers_;
   std::unique_ptr<PostureHistory> postures_;
   mutable std::mutex loads_mutex_;
   std::map<std::uint64_t, std::shared_ptr<const model::Model>> loads_;  ///< the last few
