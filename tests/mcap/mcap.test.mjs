@@ -1,6 +1,6 @@
 // Tests files of `hamelin export --format mcap`.
 //   HAMELIN_RUNS  folder with NAME.jsonl (the log), NAME.mcap and NAME.html (its report) of the runs
-//                 shelf, person, carry and follow; see run.sh
+//                 shelf, person, carry, follow and drawing; see run.sh
 //   NODE_MODULES  folder of @mcap/core, @foxglove/schemas, ajv and fzstd
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
@@ -37,7 +37,7 @@ async function readMcap(name) {
   return { bytes, reader, messages, of };
 }
 
-const files = Object.fromEntries(await Promise.all(['shelf', 'person', 'carry', 'follow'].map(async (name) => [name, await readMcap(name)])));
+const files = Object.fromEntries(await Promise.all(['shelf', 'person', 'carry', 'follow', 'drawing'].map(async (name) => [name, await readMcap(name)])));
 const logOf = (name) => readFileSync(fileOf(name, 'jsonl'), 'utf8').trim().split('\n').map((line) => JSON.parse(line));
 const nanoseconds = ({ sec, nsec }) => BigInt(sec) * 1000000000n + BigInt(nsec);
 const timeOf = (seconds) => BigInt(Math.round(seconds * 1e9));
@@ -215,6 +215,29 @@ test('the map and the arm are sent again when they change', () => {
   const [held, put] = [updates[down], updates[down + 1]].map(({ json }) => json.entities.find(({ id }) => id.startsWith('load/')));
   const tip = frameIn(files.carry.of('/tf').findLast(({ time }) => time <= timeOf(loads[down].time_s)), 'tip');
   assert.ok(distance(moved(tip, point(held.spheres[0].pose.position)), point(put.spheres[0].pose.position)) < 0.01);
+});
+
+test('a capsule is a cylinder between the centres of two spheres', () => {
+  const entity = files.carry.of('/arm').flatMap(({ json }) => json.entities).find(({ id, cylinders }) => id.startsWith('load/') && cylinders.length);
+  assert.equal(entity.spheres.length, 2 * entity.cylinders.length);
+  entity.cylinders.forEach(({ pose, size }, k) => {
+    const ends = [-1, 1].map((side) => moved({ translation: pose.position, rotation: pose.orientation }, [0, 0, side * size.z / 2]));
+    ends.forEach((end, i) => {
+      const sphere = entity.spheres[2 * k + i];
+      assert.ok(distance(end, point(sphere.pose.position)) < 1e-12);
+      assert.equal(sphere.size.x, size.x);
+    });
+  });
+});
+
+test('every drawing of the planner is sent', () => {
+  assert.ok(files.drawing.of('/drawing').length > 1);
+  for (const [name, file] of Object.entries(files)) {
+    const drawn = logOf(name).filter(({ type, paths }) => type === 'tick' && paths);
+    const sent = file.of('/drawing');
+    assert.deepEqual(sent.map(({ time }) => time), drawn.map((tick) => timeOf(tick.time_s)));
+    drawn.forEach(({ paths }, k) => assert.deepEqual(sent[k].json.entities[0].lines.map(({ points }) => points.flatMap(point)), paths));
+  }
 });
 
 test('goals change as they are reached, and the result is the last entry of the log', () => {

@@ -18,18 +18,19 @@ command -v node >/dev/null || skip "node: not found"
 rm -rf "$work"
 mkdir -p "$work"
 cd "$here/../.."
-export_run() { # NAME SCENE EXPORT_OPTIONS [RUN_OPTION...]; a run need not reach its goal
+export_run() { # NAME SCENE PLANNER EXPORT_OPTIONS [RUN_OPTION...]; a run need not reach its goal
   local code=0 log="$work/$1.jsonl"
-  "$program" run "data/scenes/$2.json" --planner hybrid --log "$log" --quiet "${@:4}" || code=$?
+  "$program" run "data/scenes/$2.json" --planner "$3" --log "$log" --quiet "${@:5}" || code=$?
   ((code <= 1)) || exit "$code"
   # shellcheck disable=SC2086  # several options
-  "$program" export "$log" --format mcap $3 -o "$work/$1.mcap"
+  "$program" export "$log" --format mcap $4 -o "$work/$1.mcap"
   # The report gives the geometry of the robot and the places of obstacles by another route.
   "$program" report "$log" -o "$work/$1.html"
 }
-export_run shelf shelf "" --set /duration_s=2
-export_run person shelf_person "--rate 50" --set /duration_s=6 --every 4
-export_run carry shelf_carry "" --every 20
-export_run follow follow "--rate 100" --set /duration_s=3
+export_run shelf shelf hybrid "" --set /duration_s=2
+export_run person shelf_person hybrid "--rate 50" --set /duration_s=6 --every 4
+export_run carry shelf_carry hybrid "" --every 20
+export_run follow follow hybrid "--rate 100" --set /duration_s=3
+export_run drawing clutter mppi "--rate 20" --set /duration_s=0.5 --set /planner/params/record_rollouts=3
 
 NODE_MODULES=$modules HAMELIN_RUNS=$work node --test "$here/mcap.test.mjs"

@@ -75,7 +75,8 @@ Json state(std::uint64_t time_ns, const Json& tick, const std::vector<std::strin
 Json log_entry(std::uint64_t time_ns, const Json& line) {
   if (line["type"] != "result") return entry(time_ns, false, text_of(line, "text"));
   const std::string outcome = text_of(line, "outcome"), cause = text_of(line, "cause");
-  return entry(time_ns, outcome != "reached" && outcome != "completed",
+  const bool well = outcome == "completed" || outcome == "reached" || outcome == "followed";
+  return entry(time_ns, !well,
                fmt::format("the run ends: {}{}{}", outcome, cause.empty() ? "" : ": ", cause));
 }
 
