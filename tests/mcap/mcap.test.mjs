@@ -1,6 +1,6 @@
 // Tests files of `hamelin export --format mcap`.
 //   HAMELIN_RUNS  folder with NAME.jsonl (the log), NAME.mcap and NAME.html (its report) of the runs
-//                 shelf, person, carry, follow and drawing; see run.sh
+//                 shelf, person, carry, follow, planar and drawing; see run.sh
 //   NODE_MODULES  folder of @mcap/core, @foxglove/schemas, ajv and fzstd
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
@@ -37,7 +37,7 @@ async function readMcap(name) {
   return { bytes, reader, messages, of };
 }
 
-const files = Object.fromEntries(await Promise.all(['shelf', 'person', 'carry', 'follow', 'drawing'].map(async (name) => [name, await readMcap(name)])));
+const files = Object.fromEntries(await Promise.all(['shelf', 'person', 'carry', 'follow', 'planar', 'drawing'].map(async (name) => [name, await readMcap(name)])));
 const logOf = (name) => readFileSync(fileOf(name, 'jsonl'), 'utf8').trim().split('\n').map((line) => JSON.parse(line));
 const nanoseconds = ({ sec, nsec }) => BigInt(sec) * 1000000000n + BigInt(nsec);
 const timeOf = (seconds) => BigInt(Math.round(seconds * 1e9));

@@ -31,6 +31,7 @@ export_run shelf shelf hybrid "" --set /duration_s=2
 export_run person shelf_person hybrid "--rate 50" --set /duration_s=6 --every 4
 export_run carry shelf_carry hybrid "" --every 20
 export_run follow follow hybrid "--rate 100" --set /duration_s=3
+export_run planar paper_52_hybrid hybrid "" --set /duration_s=0.5
 export_run drawing clutter mppi "--rate 20" --set /duration_s=0.5 --set /planner/params/record_rollouts=3
 
 NODE_MODULES=$modules HAMELIN_RUNS=$work node --test "$here/mcap.test.mjs"
