@@ -8,7 +8,6 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/csv.hpp"
-#include "hamelin/log/read_log.hpp"
 
 namespace hamelin::log {
 
@@ -56,66 +55,83 @@ Json finite_array(const VectorXd& x, double time_s, const char* what) {
 
 }  // namespace
 
-Trajectory read_trajectory(const std::filesystem::path& log) {
-  LogReader reader(log);
-  Trajectory trajectory;
-  Json line;
-  if (!reader.next(line) || line.value("type", Json()) != "header")
+TickReader::TickReader(const std::filesystem::path& log) : reader_(log) {
+  if (!reader_.next(header_) || header_.value("type", Json()) != "header")
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: has no header, expected a log of hamelin", log.string()));
-  check_line(line, reader.where());
-  for (const auto& joint : line["joints"])
-    trajectory.joints.push_back(joint["name"].get<std::string>());
-  const auto joints = static_cast<Eigen::Index>(trajectory.joints.size());
-  while (reader.next(line)) {
-    if (line.value("type", Json()) != "tick") continue;
-    check_line(line, reader.where());
-    Trajectory::Point point{line["time_s"].get<double>(), vector_of(line["q"]),
-                            vector_of(line["v"]), vector_of(line.value("tau", Json::array()))};
-    if (point.q.size() != joints || point.v.size() != joints ||
-        (point.tau.size() != 0 && point.tau.size() != joints))
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: joint vectors of another length, expected {} numbers",
-                              reader.where(), joints));
-    if (!trajectory.points.empty() && !(point.time_s > trajectory.points.back().time_s))
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: /time_s: {} s after {} s, expected increasing times",
-                              reader.where(), point.time_s, trajectory.points.back().time_s));
-    trajectory.points.push_back(std::move(point));
-  }
+  check_line(header_, reader_.where());
+  for (const auto& joint : header_["joints"]) joints_.push_back(joint["name"].get<std::string>());
+}
+
+bool TickReader::next() {
+  if (!reader_.next(line_)) return false;
+  is_tick_ = line_.value("type", Json()) == "tick";
+  if (is_tick_) read_point();
+  return true;
+}
+
+void TickReader::read_point() {
+  check_line(line_, reader_.where());
+  Trajectory::Point point{line_["time_s"].get<double>(), vector_of(line_["q"]),
+                          vector_of(line_["v"]), vector_of(line_.value("tau", Json::array()))};
+  const auto joints = static_cast<Eigen::Index>(joints_.size());
+  if (point.q.size() != joints || point.v.size() != joints ||
+      (point.tau.size() != 0 && point.tau.size() != joints))
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: joint vectors of another length, expected {} numbers",
+                            reader_.where(), joints));
+  if (any_tick_ && !(point.time_s > point_.time_s))
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: /time_s: {} s after {} s, expected increasing times",
+                            reader_.where(), point.time_s, point_.time_s));
+  point_ = std::move(point);
+  any_tick_ = true;
+}
+
+Trajectory read_trajectory(const std::filesystem::path& log) {
+  TickReader reader(log);
+  Trajectory trajectory{reader.joints(), {}};
+  while (reader.next())
+    if (const auto* point = reader.point()) trajectory.points.push_back(*point);
   if (trajectory.points.empty())
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: has no ticks, expected a motion", log.string()));
   return trajectory;
 }
 
-Trajectory resampled(const Trajectory& trajectory, double rate_hz) {
+long sample_count(double span_s, double rate_hz) {
   if (!std::isfinite(rate_hz) || rate_hz <= 0.0)
     throw Error(ErrorCode::usage, fmt::format("rate {} Hz: expected a positive number", rate_hz));
-  const auto& points = trajectory.points;
-  Trajectory out{trajectory.joints, {}};
-  if (points.empty()) return out;
-  const double begin = points.front().time_s, span = points.back().time_s - begin;
-  if (span * rate_hz > 1e8)
+  if (span_s * rate_hz > 1e8)
     throw Error(ErrorCode::usage,
                 fmt::format("rate {} Hz: gives {:.3g} points, expected at most 1e8", rate_hz,
-                            span * rate_hz));
-  // A sample that equals the last point up to rounding is the last point.
-  const auto sample_count = static_cast<long>(std::ceil(span * rate_hz - 1e-6));
+                            span_s * rate_hz));
+  return static_cast<long>(std::ceil(span_s * rate_hz - 1e-6));
+}
+
+// docs/theory.md (13.42)
+Trajectory::Point interpolated(const Trajectory::Point& a, const Trajectory::Point& b,
+                               double time_s) {
+  const double h = b.time_s - a.time_s, u = (time_s - a.time_s) / h;
+  const double u2 = u * u, u3 = u2 * u;
+  return {time_s,
+          (2 * u3 - 3 * u2 + 1) * a.q + (u3 - 2 * u2 + u) * h * a.v + (3 * u2 - 2 * u3) * b.q +
+              (u3 - u2) * h * b.v,
+          6 * (u2 - u) / h * (a.q - b.q) + (3 * u2 - 4 * u + 1) * a.v + (3 * u2 - 2 * u) * b.v,
+          a.tau};
+}
+
+Trajectory resampled(const Trajectory& trajectory, double rate_hz) {
+  const auto& points = trajectory.points;
+  Trajectory out{trajectory.joints, {}};
+  const double begin = points.empty() ? 0.0 : points.front().time_s;
+  const long samples = sample_count(points.empty() ? 0.0 : points.back().time_s - begin, rate_hz);
+  if (points.empty()) return out;
   std::size_t at = 0;
-  for (long i = 0; i < sample_count; ++i) {
+  for (long i = 0; i < samples; ++i) {
     const double time_s = begin + static_cast<double>(i) / rate_hz;
     while (at + 2 < points.size() && points[at + 1].time_s <= time_s) ++at;
-    const auto &a = points[at], &b = points[at + 1];
-    // docs/theory.md (13.42)
-    const double h = b.time_s - a.time_s, u = (time_s - a.time_s) / h;
-    const double u2 = u * u, u3 = u2 * u;
-    out.points.push_back(
-        {time_s,
-         (2 * u3 - 3 * u2 + 1) * a.q + (u3 - 2 * u2 + u) * h * a.v + (3 * u2 - 2 * u3) * b.q +
-             (u3 - u2) * h * b.v,
-         6 * (u2 - u) / h * (a.q - b.q) + (3 * u2 - 4 * u + 1) * a.v + (3 * u2 - 2 * u) * b.v,
-         a.tau});
+    out.points.push_back(interpolated(points[at], points[at + 1], time_s));
   }
   out.points.push_back(points.back());
   return out;

@@ -38,13 +38,6 @@ Json read_first_line(log::LogReader& reader, const std::filesystem::path& file) 
   return header;
 }
 
-// Whether the map of the run is available and unchanged.
-bool has_original_map(const simulation::Recorded& recorded) {
-  return recorded.scene.map && !recorded.scene.map->file.empty() &&
-         std::none_of(recorded.changed.begin(), recorded.changed.end(),
-                      [](const auto& changed) { return changed.role == "map"; });
-}
-
 // Runs are named by their planner. Runs of one planner are distinguished by the names of their
 // logs, and logs of one name by their number.
 std::vector<std::string> names_of(const Json& runs) {
@@ -88,7 +81,7 @@ Data make_data(const std::vector<std::filesystem::path>& logs, const Options& op
     log::LogReader reader(file);
     const Json header = read_first_line(reader, file);
     const simulation::Recorded recorded = simulation::read_header(header, file);
-    const bool has_map = has_original_map(recorded);
+    const bool has_map = simulation::has_original_map(recorded);
     std::string key = fmt::format("{}{}", world_key(recorded), has_map ? "" : " without map");
     auto world = std::find_if(worlds.begin(), worlds.end(),
                               [&](const auto& known) { return known->key == key; });

@@ -124,15 +124,7 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
       config_(header["config"]),
       provenance_(header["provenance"]) {
   const auto& links = world.model.robot().links;
-  const Json& joints = header["joints"];
-  bool same = joints.size() == links.size();
-  for (std::size_t i = 0; same && i < links.size(); ++i)
-    same = joints[i]["name"] == links[i].joint.name;
-  if (!same)
-    throw Error(
-        ErrorCode::invalid,
-        fmt::format("{}: its joints differ from those in the log, expected the robot of the run",
-                    recorded.scene.robot.file.string()));
+  simulation::check_joints(header, recorded, world.model.robot());
   for (const auto& changed : recorded.changed) notes_.push_back(changed.text);
   if (recorded.every > 1)
     notes_.push_back(fmt::format(

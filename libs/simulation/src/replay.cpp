@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -270,6 +271,24 @@ std::optional<long> logged_stop_step(const fs::path& log) {
 }
 
 }  // namespace
+
+bool has_original_map(const Recorded& recorded) {
+  return recorded.scene.map && !recorded.scene.map->file.empty() &&
+         std::none_of(recorded.changed.begin(), recorded.changed.end(),
+                      [](const auto& changed) { return changed.role == "map"; });
+}
+
+void check_joints(const Json& header, const Recorded& recorded, const model::Robot& robot) {
+  const Json& joints = header["joints"];
+  bool same = joints.size() == robot.links.size();
+  for (std::size_t i = 0; same && i < robot.links.size(); ++i)
+    same = joints[i]["name"] == robot.links[i].joint.name;
+  if (!same)
+    throw Error(
+        ErrorCode::invalid,
+        fmt::format("{}: its joints differ from those in the log, expected the robot of the run",
+                    recorded.scene.robot.file.string()));
+}
 
 Recorded read_header(const Json& header, const fs::path& log) {
   const std::string where = log.string() + ": line 1";

@@ -86,7 +86,8 @@ Strings completions(const Strings& words) {
 
 /// The output of the program on a terminal, with these environment variables.
 std::string on_terminal(const Strings& arguments,
-                        const std::vector<std::pair<const char*, const char*>>& variables) {
+                        const std::vector<std::pair<const char*, const char*>>& variables,
+                        int exit_code = 0) {
   int terminal = -1;
   const pid_t child = ::forkpty(&terminal, nullptr, nullptr, nullptr);
   if (child == 0) {
@@ -106,7 +107,7 @@ std::string on_terminal(const Strings& arguments,
   ::waitpid(child, &status, 0);
   ::close(terminal);
   REQUIRE(WIFEXITED(status));
-  REQUIRE(WEXITSTATUS(status) == 0);
+  REQUIRE(WEXITSTATUS(status) == exit_code);
   return text;
 }
 
@@ -280,6 +281,14 @@ TEST_CASE("colour appears only on terminals, and can be disabled", "[command_lin
             .find(escape) == std::string::npos);
   Sandbox sandbox;
   CHECK(sandbox.run(free_fall).out.find(escape) == std::string::npos);
+}
+
+TEST_CASE("export does not print MCAP files on a terminal", "[command_line]") {
+  const int terminal = ::posix_openpt(O_RDWR | O_NOCTTY);
+  test::skip_unless(terminal >= 0, "no pseudo-terminal is available");
+  ::close(terminal);
+  CHECK(on_terminal({"export", "run.jsonl", "--format", "mcap"}, {{"TERM", "xterm"}}, 2)
+            .find("standard output is a terminal, expected --output FILE") != std::string::npos);
 }
 
 TEST_CASE("bash completes commands, options, values, planners and files", "[command_line]") {

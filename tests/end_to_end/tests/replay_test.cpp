@@ -460,6 +460,7 @@ TEST_CASE(
         {"replay", "altered.jsonl", "--verify"},
         {"report", "altered.jsonl", "-o", "altered.html"},
         {"export", "altered.jsonl"},
+        {"export", "altered.jsonl", "--format", "mcap", "-o", "altered.mcap"},
         {"validate", "altered.jsonl"}};
     for (const auto& command : commands) {
       CAPTURE(command, altered[at]);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "hamelin/io/json.hpp"
+#include "hamelin/log/read_log.hpp"
 
 namespace hamelin::log {
 
@@ -21,6 +22,37 @@ struct Trajectory {
   std::vector<Point> points;  ///< one per tick line
 };
 
+/// Reads the lines of a log one by one, and checks its header and ticks.
+class TickReader {
+ public:
+  /// Reads the header. @throws Error io, parse or invalid for a file that is not a log
+  explicit TickReader(const std::filesystem::path& log);
+
+  /// Reads the next line. @return false at the end
+  /// @throws Error parse or invalid, naming the line, for a tick that does not match the schema or
+  ///         the number of joints, or that is not later than the one before
+  bool next();
+  [[nodiscard]] const Json& header() const noexcept { return header_; }
+  [[nodiscard]] const std::vector<std::string>& joints() const noexcept { return joints_; }
+  /// The line that next() read.
+  [[nodiscard]] const Json& line() const noexcept { return line_; }
+  /// The point of the line; null if the line is not a tick.
+  [[nodiscard]] const Trajectory::Point* point() const noexcept {
+    return is_tick_ ? &point_ : nullptr;
+  }
+  /// Knows the position of the line, for messages.
+  [[nodiscard]] const LogReader& lines() const noexcept { return reader_; }
+
+ private:
+  void read_point();
+
+  LogReader reader_;
+  Json header_, line_;
+  std::vector<std::string> joints_;
+  Trajectory::Point point_;
+  bool is_tick_ = false, any_tick_ = false;
+};
+
 /// @throws Error io, parse or invalid, naming the line, for a file that is not a log or has no
 /// ticks
 [[nodiscard]] Trajectory read_trajectory(const std::filesystem::path& log);
@@ -30,6 +62,16 @@ struct Trajectory {
 /// may be shorter.
 /// @param rate_hz positive and finite @throws Error usage
 [[nodiscard]] Trajectory resampled(const Trajectory& trajectory, double rate_hz);
+
+/// The motion between two points, as resampled() computes it.
+/// @param time_s from a's time up to, but without, that of b, which is later
+[[nodiscard]] Trajectory::Point interpolated(const Trajectory::Point& a, const Trajectory::Point& b,
+                                             double time_s);
+
+/// Number of samples before the last point that a rate gives over a span of time. A sample that
+/// equals the last point up to rounding is the last point.
+/// @throws Error usage for a rate that is not positive and finite, or more than 1e8 samples
+[[nodiscard]] long sample_count(double span_s, double rate_hz);
 
 /// Comma-separated values (RFC 4180): time_s, then q_, v_ and, where they are known, tau_ and a_ of
 /// each joint. Numbers that are not finite are left empty.

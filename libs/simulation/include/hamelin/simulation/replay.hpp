@@ -32,6 +32,12 @@ struct Recorded {
 /// @throws Error invalid if it is not a header, or its scene cannot be read
 [[nodiscard]] Recorded read_header(const Json& header, const std::filesystem::path& log);
 
+/// Whether the run has a map from a file, which is available and unchanged.
+[[nodiscard]] bool has_original_map(const Recorded& recorded);
+
+/// @throws Error invalid if the joints in the header differ from the robot's
+void check_joints(const Json& header, const Recorded& recorded, const model::Robot& robot);
+
 /// Reads the header from a log's first line. `other_build` also names a planner of another build.
 /// @throws Error also io or parse
 [[nodiscard]] Recorded read_header(const std::filesystem::path& log,
