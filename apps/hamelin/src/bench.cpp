@@ -4,10 +4,12 @@
 #include <memory>
 #include <thread>
 
+#include "bench_explain.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "hamelin/bench/draw.hpp"
 #include "hamelin/bench/families.hpp"
+#include "hamelin/bench/moving_scene.hpp"
 #include "hamelin/bench/results.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
@@ -35,8 +37,10 @@ struct SetOptions {
 struct RunOptions : SetOptions {
   std::vector<std::string> planners, assignments, ablations;
   bool expect_gain = false;
-  std::string goal = "joint";
-  double duration_s = 20.0;
+  std::optional<std::string> goal;
+  std::optional<double> duration_s;
+  std::vector<std::string> predictions;
+  bool explain = false;
   std::size_t jobs = 1;
   double timeout_s = 600.0;
   bool markdown = false;
@@ -51,13 +55,19 @@ struct TableOptions {
 
 struct DrawFlags {
   bench::DrawOptions draw;
+  bool moving = false;
   fs::path output;
 };
 
-// The set that ships, or the one given.
+// A set that ships, by its name, or a file.
 fs::path set_file(const std::optional<fs::path>& given) {
-  if (given) return *given;
-  return prefix().value_or("/") / "share" / "hamelin" / "bench" / "v1.json";
+  const fs::path name = given.value_or("v1");
+  if (name.has_extension() || name.has_parent_path()) return name;
+  return prefix().value_or("/") / "share" / "hamelin" / "bench" / (name.string() + ".json");
+}
+
+bool is_moving(const bench::ProblemSet& set) {
+  return bench::is_moving(set.problems.front().family);
 }
 
 std::string describe(const bench::ProblemSet& set, std::size_t count) {
@@ -69,7 +79,10 @@ int bench_make(const SetOptions& options) {
   const fs::path file = set_file(options.set);
   const bench::ProblemSet set = bench::read_problem_set(file);
   const auto problems = bench::select(set, options.selection);
-  (void)bench::write_problems(problems, options.output, file.string());
+  if (is_moving(set))
+    (void)bench::write_moving_scenes(set, problems, {std::nullopt}, options.output, file.string());
+  else
+    (void)bench::write_problems(problems, options.output, file.string());
   if (options.json)
     print_json({{"directory", options.output.string()},
                 {"set", set.name},
@@ -80,26 +93,57 @@ int bench_make(const SetOptions& options) {
   return 0;
 }
 
-void plan_benchmark(const RunOptions& options, const fs::path& file, const bench::ProblemSet& set,
-                    const std::vector<bench::Problem>& problems) {
-  sweep::PlanOptions plan;
+// The problems of a set with maps, each with a goal of the chosen kind.
+void add_problems(sweep::PlanOptions& plan, const RunOptions& options, const fs::path& file,
+                  const bench::ProblemSet& set, const std::vector<bench::Problem>& problems) {
+  constexpr double longest_s = 20.0;
+  if (!options.predictions.empty())
+    throw Error(ErrorCode::usage, "--prediction: has no effect, as no obstacle of the set moves");
   plan.problem.robot = set.robot.robot;
   plan.problem.spheres = set.robot.spheres;
   plan.problem.tip = set.robot.tip;
   plan.problem.resolution_m = set.resolution_m;
-  plan.goals = {sweep::goal_type_from(options.goal, "--goal")};
+  plan.goals = {sweep::goal_type_from(options.goal.value_or("joint"), "--goal")};
+  plan.duration_s = options.duration_s.value_or(longest_s);
+  plan.files = bench::write_problems(problems, options.output / "problems", file.string());
+}
+
+// The scenes of a set whose obstacles move, once per prediction.
+void add_moving_scenes(sweep::PlanOptions& plan, const RunOptions& options, const fs::path& file,
+                       const bench::ProblemSet& set, const std::vector<bench::Problem>& problems) {
+  if (options.goal)
+    throw Error(ErrorCode::usage,
+                "--goal: has no effect, as problems with moving obstacles have joint goals");
+  std::vector<bench::PredictionChoice> predictions;
+  for (const auto& name : options.predictions)
+    predictions.push_back(name == bench::describe(bench::PredictionChoice{})
+                              ? bench::PredictionChoice{}
+                              : sweep::prediction_from(name, "--prediction"));
+  if (predictions.empty()) predictions = {std::nullopt};
+  plan.files = bench::write_moving_scenes(set, problems, predictions, options.output / "problems",
+                                          file.string());
+  for (std::size_t i = 0; i < plan.files.size(); ++i)
+    plan.labels[plan.files[i].stem().string()] =
+        bench::labels(problems[i % problems.size()], predictions[i / problems.size()]);
+  plan.duration_s = options.duration_s;
+}
+
+void plan_benchmark(const RunOptions& options, const fs::path& file, const bench::ProblemSet& set,
+                    const std::vector<bench::Problem>& problems) {
+  sweep::PlanOptions plan;
   plan.planners = options.planners;
   plan.set = options.assignments;
-  plan.duration_s = options.duration_s;
   plan.plugin_directories = plugin_path(options.plugin_path);
   if (!options.ablations.empty() && plan.planners.empty()) plan.planners = {"hybrid"};
   sweep::add_ablations(plan, options.ablations);
-  plan.files = bench::write_problems(problems, options.output / "problems", file.string());
+  const auto add = is_moving(set) ? &add_moving_scenes : &add_problems;
+  add(plan, options, file, set, problems);
   Progress progress("problems made");
   plan.on_scene = [&progress](std::size_t done, std::size_t all) {
     progress.show(static_cast<double>(done), static_cast<double>(all));
   };
-  bench::check_maps(problems, sweep::make_plan(options.output, plan), file.string());
+  const sweep::Plan made = sweep::make_plan(options.output, plan);
+  if (!is_moving(set)) bench::check_maps(problems, made, file.string());
 }
 
 sweep::RunOutcome run_benchmark(const RunOptions& options) {
@@ -142,9 +186,13 @@ int bench_run(const RunOptions& options) {
     throw Error(ErrorCode::usage, "--expect-gain: has no effect without --ablate");
   const fs::path file = set_file(options.set);
   const bench::ProblemSet set = bench::read_problem_set(file);
+  if (options.explain && !is_moving(set))
+    throw Error(ErrorCode::usage, "--explain: has no effect, as no obstacle of the set moves");
   const auto problems = bench::select(set, options.selection);
   plan_benchmark(options, file, set, problems);
   const sweep::RunOutcome outcome = run_benchmark(options);
+  if (options.explain)
+    explain_contacts(bench::read_results(options.output, set), options.output, options.plugin_path);
   const auto results = write_results(options.output, set, options.markdown, options.json);
   if (outcome.stopped) return log::exit_code(log::Outcome::interrupted);
   if (!options.expect_gain) return 0;
@@ -174,6 +222,15 @@ class ScratchDirectory {
   fs::path path_;
 };
 
+std::string left_out(const bench::DrawCounts& drawn, bool moving) {
+  if (moving)
+    return fmt::format("{} had no start or goal, {} no room for the obstacles",
+                       drawn.no_start_or_goal, drawn.no_room);
+  return fmt::format(
+      "{} had no start or goal, {} a free straight motion, {} no path that was found",
+      drawn.no_start_or_goal, drawn.straight_is_free, drawn.path_unknown);
+}
+
 int bench_draw(const DrawFlags& flags) {
   bench::DrawOptions options = flags.draw;
   const fs::path target = output_target(flags.output, {options.robot.robot, options.robot.spheres});
@@ -185,30 +242,36 @@ int bench_draw(const DrawFlags& flags) {
     options.on_problem = [&progress](std::size_t done, std::size_t all) {
       progress.show(static_cast<double>(done), static_cast<double>(all));
     };
-    set = bench::draw_problem_set(options);
+    set = flags.moving ? bench::draw_moving_set(options) : bench::draw_problem_set(options);
   }
   const std::string text = bench::to_text(set, target.parent_path());
   write_file_atomically(target, text);
-  const bench::DrawCounts& drawn = set.drawn;
-  report(fmt::format(
-      "{}: {} problems of {} candidates; {} had no start or goal, {} a free straight motion, "
-      "{} no path that was found\nSHA-256 {}\n",
-      target.string(), set.problems.size(), drawn.candidates, drawn.no_start_or_goal,
-      drawn.straight_is_free, drawn.path_unknown, sha256_hex(text)));
+  report(fmt::format("{}: {} problems of {} candidates; {}\nSHA-256 {}\n", target.string(),
+                     set.problems.size(), set.drawn.candidates, left_out(set.drawn, flags.moving),
+                     sha256_hex(text)));
   return 0;
+}
+
+std::vector<std::string> all_families() {
+  std::vector<std::string> all = bench::families();
+  const auto& moving = bench::moving_families();
+  all.insert(all.end(), moving.begin(), moving.end());
+  return all;
 }
 
 void add_families(CLI::App& command, std::vector<std::string>& chosen) {
   restrict_values(command.add_option("--family", chosen, "families to use (default all)"),
-                  bench::families())
+                  all_families())
       ->type_name("NAME,NAME")
       ->delimiter(',')
       ->allow_extra_args(false);
 }
 
 void add_problems_option(CLI::App& command, std::optional<fs::path>& set) {
-  command.add_option("--problems", set, "problem set (default the one that ships, v1)")
-      ->type_name("SET.json");
+  command
+      .add_option("--problems", set,
+                  "problem set: a file, or one of those that ship, v1 (the default) and moving")
+      ->type_name("SET");
 }
 
 void add_set_options(CLI::App& command, SetOptions& options) {
@@ -220,15 +283,23 @@ void add_set_options(CLI::App& command, SetOptions& options) {
       ->type_name("N")
       ->default_str("")
       ->check(CLI::Range(1L, 100'000L));
+  command
+      .add_option("--per-cell", options.selection.per_cell,
+                  "where obstacles move: use only the first N problems of each number and speed "
+                  "of obstacles (default all)")
+      ->type_name("N")
+      ->default_str("")
+      ->check(CLI::Range(1L, 100'000L));
   command.add_flag("--json", options.json, "print the result as JSON");
 }
 
 void add_make(CLI::App& parent, int& exit_code) {
   auto* command = add_command(
       parent, "make",
-      "Write the problems of a set as files: start, goal and primitives. They are the same to the "
-      "byte on every machine, which is checked",
+      "Write the problems of a set as files: start, goal and primitives, or scenes where obstacles "
+      "move. They are the same to the byte on every machine, which is checked",
       "hamelin bench make -o problems\n"
+      "hamelin bench make --problems moving --per-cell 1 -o scenes\n"
       "hamelin bench make --family shelf,cage --per-family 2 -o problems");
   const auto options = std::make_shared<SetOptions>();
   command->add_option("-o,--output", options->output, "directory to write the problems to")
@@ -257,6 +328,20 @@ void add_planner_options(CLI::App& command, RunOptions& options) {
                    "problems without a part (p < 0.05), and name the part");
 }
 
+void add_moving_options(CLI::App& command, RunOptions& options) {
+  restrict_values(
+      command.add_option("--prediction", options.predictions,
+                         "where obstacles move: what planners are told of their motion; may be "
+                         "repeated, to compare (default as drawn)"),
+      {"drawn", "path", "constant-acceleration", "constant-velocity", "speed-bound"})
+      ->type_name("KIND")
+      ->allow_extra_args(false);
+  command.add_flag("--explain", options.explain,
+                   "where obstacles move: also repeat each run that ends in contact, write its log "
+                   "to DIR/contacts, and search whether the contact was avoidable, as `hamelin "
+                   "explain` does");
+}
+
 void add_run_command(CLI::App& parent, int& exit_code) {
   auto* command = add_command(
       parent, "run",
@@ -264,7 +349,8 @@ void add_run_command(CLI::App& parent, int& exit_code) {
       "DIR/benchmark.json. Resumes where it stopped if it was interrupted",
       "hamelin bench run --planner hybrid --planner apf --per-family 1 -o quick\n"
       "hamelin bench run --planner hybrid+rrt-connect --planner python:mine.py:Mine -o full\n"
-      "hamelin bench run --ablate steering --ablate escape=none --per-family 2 -o parts");
+      "hamelin bench run --ablate steering --ablate escape=none --per-family 2 -o parts\n"
+      "hamelin bench run --problems moving --per-cell 1 --explain -o moving");
   const auto options = std::make_shared<RunOptions>();
   command->add_option("-o,--output", options->output, "directory to write problems and records to")
       ->required()
@@ -275,15 +361,16 @@ void add_run_command(CLI::App& parent, int& exit_code) {
                    "set one value of all scenes, e.g. /step_s=0.002; may be repeated")
       ->type_name("/json/pointer=VALUE")
       ->allow_extra_args(false);
-  restrict_values(
-      command->add_option("--goal", options->goal, "kind of goal that the problems get"),
-      {"joint", "position", "pose"})
-      ->type_name("KIND")
-      ->capture_default_str();
-  command->add_option("--duration", options->duration_s, "longest simulated time of a run [s]")
+  restrict_values(command->add_option("--goal", options->goal,
+                                      "kind of goal that the problems get (default joint)"),
+                  {"joint", "position", "pose"})
+      ->type_name("KIND");
+  command
+      ->add_option("--duration", options->duration_s,
+                   "longest simulated time of a run [s] (default 20, or as the scenes say)")
       ->type_name("T")
-      ->capture_default_str()
       ->check(CLI::PositiveNumber);
+  add_moving_options(*command, *options);
   options->jobs = std::max(1U, std::thread::hardware_concurrency());
   command
       ->add_option("--jobs", options->jobs, "number of parallel processes (default one per core)")
@@ -336,6 +423,10 @@ void add_draw(CLI::App& parent, int& exit_code) {
       ->type_name("FILE.json");
   command->add_option("--tip", draw.robot.tip, "tip link of the robot")->type_name("LINK");
   add_families(*command, draw.families);
+  command->add_flag("--moving", flags->moving,
+                    "draw problems whose obstacles move, from the families cubes, people and "
+                    "pendulums; --per-family is then the number per family, number of obstacles "
+                    "and speed");
   command->add_option("--per-family", draw.per_family, "number of problems per family")
       ->type_name("N")
       ->capture_default_str()
@@ -357,16 +448,19 @@ void add_draw(CLI::App& parent, int& exit_code) {
 }
 
 void add_list(CLI::App& parent, int& exit_code) {
-  auto* command = add_command(parent, "families", "List the families of clutter",
-                              "hamelin bench families\nhamelin bench families --json");
+  auto* command =
+      add_command(parent, "families", "List the families of clutter and of moving obstacles",
+                  "hamelin bench families\nhamelin bench families --json");
   const auto json = std::make_shared<bool>(false);
   command->add_flag("--json", *json, "print the list as JSON");
   command->callback([json, &exit_code] {
     Json all = Json::object();
     std::string text;
-    for (const auto& family : bench::families()) {
-      all[family] = bench::describe(family);
-      text += fmt::format("{:<12} {}\n", family, bench::describe(family));
+    for (const auto& family : all_families()) {
+      const auto description =
+          bench::is_moving(family) ? bench::describe_movers(family) : bench::describe(family);
+      all[family] = description;
+      text += fmt::format("{:<12} {}\n", family, description);
     }
     if (*json)
       print_json(all);

@@ -84,18 +84,7 @@ std::vector<report::Remark> remarks_of(const sweep::MergedRun& run, const sweep:
 void write_replay(const sweep::MergedRun& run, const fs::path& target,
                   const ReplayRequest& request) {
   const TemporaryLog temporary(fs::path(target).replace_extension(".jsonl.zst"));
-  const scene::Scene scene = sweep::read_scene(run.run, run.directory);
-  sweep::JudgedRun now;
-  {
-    log::RunLog log(temporary.file());
-    simulation::Watch watch;
-    watch.log = &log;
-    watch.argv = command_line();
-    watch.stop = &stop_on_signals();
-    const HangGuard guard;
-    now = sweep::run_under_judge(scene, plugin_path(request.plugin_path), watch, plant_factory());
-    log.flush();
-  }
+  const sweep::JudgedRun now = repeat_run(run, temporary.file(), request.plugin_path);
   report::Options options;
   options.remarks = remarks_of(run, now);
   const report::Data data = report::make_data({temporary.file()}, options);
@@ -104,6 +93,21 @@ void write_replay(const sweep::MergedRun& run, const fs::path& target,
 }
 
 }  // namespace
+
+sweep::JudgedRun repeat_run(const sweep::MergedRun& run, const fs::path& log_file,
+                            const std::vector<fs::path>& directories) {
+  const scene::Scene scene = sweep::read_scene(run.run, run.directory);
+  log::RunLog log(log_file);
+  simulation::Watch watch;
+  watch.log = &log;
+  watch.argv = command_line();
+  watch.stop = &stop_on_signals();
+  const HangGuard guard;
+  sweep::JudgedRun now =
+      sweep::run_under_judge(scene, plugin_path(directories), watch, plant_factory());
+  log.flush();
+  return now;
+}
 
 std::map<std::size_t, sweep::ReplayLink> write_replays(const sweep::Merged& merged,
                                                        const ReplayRequest& request) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "hamelin/sweep/judged_run.hpp"
 #include "hamelin/sweep/page.hpp"
 
 namespace hamelin::app {
@@ -14,6 +15,12 @@ struct ReplayRequest {
   std::filesystem::path page;  ///< page of the study; the others go into a folder beside it
   std::vector<std::filesystem::path> plugin_path;
 };
+
+/// Repeats one run with its judge and writes its log.
+/// @param directories to search first for planners
+/// @throws Error as sweep::read_scene and simulation::run
+sweep::JudgedRun repeat_run(const sweep::MergedRun& run, const std::filesystem::path& log_file,
+                            const std::vector<std::filesystem::path>& directories);
 
 /// Repeats the first failed runs of each class and planner, and writes a page of each, as `hamelin
 /// report` does. The judge's contact becomes an event of the page. Runs that crashed are not

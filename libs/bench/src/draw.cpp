@@ -10,12 +10,12 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/rng.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/sweep/judge.hpp"
+#include "sampler.hpp"
 
 namespace hamelin::bench {
 
@@ -25,12 +25,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double joint_grain = 1e4;  // per radian
-
-VectorXd rounded_joints(const VectorXd& q) {
-  return (q * joint_grain).array().round() / joint_grain;
-}
-
 /// The verdict of the judge on a path of straight lines.
 sweep::Verdict judge(const scene::Scene& scene, const MatrixXd& path) {
   sweep::Judge judge(scene);
@@ -38,50 +32,6 @@ sweep::Verdict judge(const scene::Scene& scene, const MatrixXd& path) {
     judge.add_node(static_cast<double>(i), path.col(i));
   return judge.verdict();
 }
-
-/// Draws configurations with the tip in a room.
-class Sampler {
- public:
-  Sampler(const model::Model& model, const DrawOptions& options, std::uint64_t seed)
-      : model_(model), ws_(model), options_(options), rng_(seed) {}
-
-  /// None if `max_draws` were not enough.
-  std::optional<VectorXd> draw(const Room& room, control::WorldView& view) {
-    for (std::size_t i = 0; i < options_.max_draws; ++i) {
-      const VectorXd q = draw_uniform();
-      dynamics::forward_kinematics(model_, ws_, q);
-      if (room.contains(dynamics::tip_pose(model_, ws_).p()) && is_clear(q, view)) return q;
-    }
-    return std::nullopt;
-  }
-
- private:
-  [[nodiscard]] bool is_clear(const VectorXd& q, control::WorldView& view) const {
-    view.look(q, 0.0);
-    return view.clearance_m() >= options_.clearance_m &&
-           view.self_clearance_m() >= options_.self_clearance_m;
-  }
-
-  VectorXd draw_uniform() {
-    VectorXd q(model_.dof());
-    for (Eigen::Index i = 0; i < q.size(); ++i) {
-      const auto& joint = model_.robot().links[static_cast<std::size_t>(i)].joint;
-      if (!joint.lower || !joint.upper)
-        throw Error(ErrorCode::invalid,
-                    fmt::format("{}: joint '{}' has no position limits, expected a lower and an "
-                                "upper limit",
-                                options_.robot.robot.string(), joint.name));
-      q[i] = rng_.uniform(*joint.lower + options_.joint_margin_rad,
-                          *joint.upper - options_.joint_margin_rad);
-    }
-    return rounded_joints(q);
-  }
-
-  const model::Model& model_;
-  dynamics::Workspace ws_;
-  const DrawOptions& options_;
-  Rng rng_;
-};
 
 class Drawer {
  public:
@@ -152,9 +102,14 @@ class Drawer {
                                                   std::uint64_t seed) const {
     control::WorldView view(scene, arm, 2.0 * options_.clearance_m);
     Sampler sampler(arm, options_, seed);
-    const auto start = sampler.draw(layout.start, view);
+    const auto draw_in = [&](const Room& room) {
+      return sampler.draw(view, [&](const dynamics::Workspace& ws) {
+        return room.contains(dynamics::tip_pose(arm, ws).p());
+      });
+    };
+    const auto start = draw_in(layout.start);
     if (!start) return std::nullopt;
-    const auto goal = sampler.draw(layout.goal, view);
+    const auto goal = draw_in(layout.goal);
     if (!goal || (*goal - *start).norm() < options_.min_distance_rad) return std::nullopt;
     MatrixXd ends(arm.dof(), 2);
     ends << *start, *goal;

@@ -6,18 +6,16 @@
 #include <map>
 
 #include "hamelin/bench/families.hpp"
+#include "hamelin/bench/moving.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
+#include "problem_files.hpp"
 
 namespace hamelin::bench {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-std::vector<double> list(const Eigen::VectorXd& x) {
-  return {x.begin(), x.end()};
-}
 
 Json primitive_json(const scene::Obstacle& o) {
   const Eigen::Vector3d& p = o.pose.p();
@@ -34,9 +32,18 @@ Json primitive_json(const scene::Obstacle& o) {
 Json problem_entry(const Problem& problem) {
   Json path = Json::array();
   for (Eigen::Index i = 0; i < problem.path.cols(); ++i) path.push_back(list(problem.path.col(i)));
-  return {
-      {"name", problem.name},     {"family", problem.family},         {"seed", problem.seed},
-      {"sha256", problem.sha256}, {"map_sha256", problem.map_sha256}, {"path", std::move(path)}};
+  Json entry{{"name", problem.name},
+             {"family", problem.family},
+             {"seed", problem.seed},
+             {"sha256", problem.sha256},
+             {"path", std::move(path)}};
+  if (is_moving(problem.family)) {
+    entry["obstacles"] = problem.obstacles;
+    entry["speed_max_m_s"] = problem.speed_max_m_s;
+  } else {
+    entry["map_sha256"] = problem.map_sha256;
+  }
+  return entry;
 }
 
 Eigen::MatrixXd path_from(const Json& points, const std::string& where) {
@@ -52,6 +59,15 @@ Eigen::MatrixXd path_from(const Json& points, const std::string& where) {
         Eigen::Map<const Eigen::VectorXd>(q.data(), static_cast<Eigen::Index>(dof));
   }
   return path;
+}
+
+// A problem has either a map, or obstacles that move.
+void check_kind(const Problem& problem, const std::string& place) {
+  if (is_moving(problem.family) != problem.map_sha256.empty())
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}/map_sha256: is {}, expected {} of the family '{}'", place,
+                            problem.map_sha256.empty() ? "missing" : "given",
+                            is_moving(problem.family) ? "none" : "that", problem.family));
 }
 
 std::string path_from_directory(const fs::path& file, const fs::path& directory) {
@@ -80,17 +96,18 @@ std::string to_text(const ProblemSet& set, const fs::path& directory) {
   }
   if (!set.robot.tip.empty()) robot["tip"] = set.robot.tip;
   const DrawCounts& drawn = set.drawn;
-  const Json head{{"schema", "hamelin.problems/1"},
-                  {"name", set.name},
-                  {"robot", std::move(robot)},
-                  {"resolution_m", set.resolution_m},
-                  {"clearance_m", set.clearance_m},
-                  {"self_clearance_m", set.self_clearance_m},
-                  {"drawn",
-                   {{"candidates", drawn.candidates},
-                    {"no_start_or_goal", drawn.no_start_or_goal},
-                    {"straight_is_free", drawn.straight_is_free},
-                    {"path_unknown", drawn.path_unknown}}}};
+  Json head{{"schema", "hamelin.problems/1"},
+            {"name", set.name},
+            {"robot", std::move(robot)},
+            {"clearance_m", set.clearance_m},
+            {"self_clearance_m", set.self_clearance_m},
+            {"drawn",
+             {{"candidates", drawn.candidates},
+              {"no_start_or_goal", drawn.no_start_or_goal},
+              {"straight_is_free", drawn.straight_is_free},
+              {"path_unknown", drawn.path_unknown}}}};
+  if (set.resolution_m > 0.0) head["resolution_m"] = set.resolution_m;
+  if (drawn.no_room > 0) head["drawn"]["no_room"] = drawn.no_room;
   // One line per problem.
   std::string text = head.dump(1);
   text.erase(text.rfind('\n'));
@@ -111,12 +128,12 @@ ProblemSet read_problem_set(const fs::path& file) {
   set.robot.robot = checked_file(robot, "file", file);
   if (robot.contains("spheres")) set.robot.spheres = checked_file(robot, "spheres", file);
   set.robot.tip = robot.value("tip", "");
-  set.resolution_m = document["resolution_m"];
+  set.resolution_m = document.value("resolution_m", 0.0);
   set.clearance_m = document["clearance_m"];
   set.self_clearance_m = document["self_clearance_m"];
   const Json& drawn = document["drawn"];
   set.drawn = {drawn["candidates"], drawn["no_start_or_goal"], drawn["straight_is_free"],
-               drawn["path_unknown"]};
+               drawn["path_unknown"], drawn.value("no_room", std::uint64_t{0})};
   std::map<std::string, std::size_t> names;
   for (std::size_t i = 0; i < document["problems"].size(); ++i) {
     const Json& from = document["problems"][i];
@@ -128,11 +145,14 @@ ProblemSet read_problem_set(const fs::path& file) {
           ErrorCode::invalid,
           fmt::format("{}/name: '{}' occurs twice, expected unique names", place, problem.name));
     problem.family = from["family"];
-    (void)describe(problem.family);
+    if (!is_moving(problem.family)) (void)describe(problem.family);
     problem.seed = from["seed"];
     problem.path = path_from(from["path"], place + "/path");
     problem.sha256 = from["sha256"];
-    problem.map_sha256 = from["map_sha256"];
+    problem.map_sha256 = from.value("map_sha256", "");
+    problem.obstacles = from.value("obstacles", std::size_t{0});
+    problem.speed_max_m_s = from.value("speed_max_m_s", 0.0);
+    check_kind(problem, place);
     set.problems.push_back(std::move(problem));
   }
   return set;
@@ -151,20 +171,45 @@ std::string problem_text(const Problem& problem) {
 
 std::vector<Problem> select(const ProblemSet& set, const Selection& selection) {
   const auto& wanted = selection.families;
+  std::vector<std::string> present;
+  for (const auto& problem : set.problems)
+    if (std::find(present.begin(), present.end(), problem.family) == present.end())
+      present.push_back(problem.family);
   for (const auto& family : wanted)
-    if (std::none_of(set.problems.begin(), set.problems.end(),
-                     [&](const Problem& p) { return p.family == family; }))
+    if (std::find(present.begin(), present.end(), family) == present.end())
       throw Error(ErrorCode::usage, fmt::format("--family {}: the set has no such family, expected "
                                                 "one of {}",
-                                                family, fmt::join(families(), ", ")));
+                                                family, fmt::join(present, ", ")));
   std::vector<Problem> selected;
-  std::map<std::string, std::size_t> taken;
+  std::map<std::string, std::size_t> of_family, of_cell;
   for (const auto& problem : set.problems) {
     const bool has_family =
         wanted.empty() || std::find(wanted.begin(), wanted.end(), problem.family) != wanted.end();
-    if (has_family && taken[problem.family]++ < selection.per_family) selected.push_back(problem);
+    const std::string cell =
+        fmt::format("{} {} {}", problem.family, problem.obstacles, problem.speed_max_m_s);
+    if (has_family && of_family[problem.family] < selection.per_family &&
+        of_cell[cell] < selection.per_cell) {
+      ++of_family[problem.family];
+      ++of_cell[cell];
+      selected.push_back(problem);
+    }
   }
   return selected;
+}
+
+void check_made(const Problem& problem, const std::string& text, const std::string& where) {
+  if (const std::string made = sha256_hex(text); made != problem.sha256)
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: problem '{}': this build makes it with SHA-256 {}, expected {}",
+                            where, problem.name, made, problem.sha256));
+}
+
+void make_directory(const fs::path& directory) {
+  std::error_code ec;
+  fs::create_directories(directory, ec);
+  if (ec)
+    throw Error(ErrorCode::io,
+                fmt::format("{}: cannot be created: {}", directory.string(), ec.message()));
 }
 
 std::vector<fs::path> write_problems(const std::vector<Problem>& problems,
@@ -172,16 +217,9 @@ std::vector<fs::path> write_problems(const std::vector<Problem>& problems,
   std::vector<std::string> texts;
   for (const auto& problem : problems) {
     texts.push_back(problem_text(problem));
-    if (const std::string made = sha256_hex(texts.back()); made != problem.sha256)
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: problem '{}': this build makes it with SHA-256 {}, expected {}",
-                              where, problem.name, made, problem.sha256));
+    check_made(problem, texts.back(), where);
   }
-  std::error_code ec;
-  fs::create_directories(directory, ec);
-  if (ec)
-    throw Error(ErrorCode::io,
-                fmt::format("{}: cannot be created: {}", directory.string(), ec.message()));
+  make_directory(directory);
   std::vector<fs::path> files;
   for (std::size_t i = 0; i < problems.size(); ++i) {
     files.push_back(directory / (problems[i].name + ".json"));

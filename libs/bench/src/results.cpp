@@ -6,9 +6,11 @@
 #include <set>
 
 #include "hamelin/bench/families.hpp"
+#include "hamelin/bench/moving.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/text_table.hpp"
 #include "hamelin/sweep/ablation.hpp"
+#include "moving_results.hpp"
 
 namespace hamelin::bench {
 
@@ -141,13 +143,15 @@ std::vector<Problem> planned_problems(const sweep::Plan& plan, const ProblemSet&
 }  // namespace
 
 Results read_results(const std::filesystem::path& directory, const ProblemSet& set) {
-  Results results{set.name,
-                  set.sha256,
-                  {},
-                  {},
-                  sweep::merge(sweep::read_sweeps({directory}), {"family", "planner"}),
-                  {},
-                  {}};
+  const bool moving = is_moving(set.problems.front().family);
+  sweep::Sweeps sweeps = sweep::read_sweeps({directory});
+  std::vector<std::string> by{"family", "planner"};
+  if (moving) {
+    name_predictions(sweeps);
+    by = {"family", obstacles_label, speed_label, "planner"};
+  }
+  Results results{set.name, set.sha256, {}, {}, sweep::merge(std::move(sweeps), by), {}, {}, {}};
+  if (moving) results.contacts = count_contacts(results.by_family.sweeps, directory);
   for (const auto& run : results.by_family.sweeps.runs) {
     const std::string& planner = run.run.labels.at("planner");
     if (std::find(results.planners.begin(), results.planners.end(), planner) ==
@@ -158,7 +162,7 @@ Results read_results(const std::filesystem::path& directory, const ProblemSet& s
   results.ablations = sweep::compare_ablations(results.by_family.sweeps);
   const sweep::Plan plan = sweep::read_plan(directory);
   const auto problems = planned_problems(plan, set, sweep::plan_file(directory).string());
-  check_maps(problems, plan, sweep::plan_file(directory).string());
+  if (!moving) check_maps(problems, plan, sweep::plan_file(directory).string());
   for (const auto& problem : problems) results.problems.push_back(problem.name);
   return results;
 }
@@ -167,20 +171,25 @@ Json to_json(const Results& results) {
   Json ablations = Json::array();
   for (std::size_t i = 0; i < results.ablations.size(); ++i)
     ablations.push_back(ablation_json(results.by_family.sweeps.ablations[i], results.ablations[i]));
-  return {{"schema", "hamelin.benchmark/1"},
-          {"set", {{"name", results.set_name}, {"sha256", results.set_sha256}}},
-          {"problems", results.problems},
-          {"planners", results.planners},
-          {"machine", results.by_family.sweeps.machine},
-          {"summary", sweep::to_json(results.by_family)},
-          {"ablations", std::move(ablations)}};
+  Json document{{"schema", "hamelin.benchmark/1"},
+                {"set", {{"name", results.set_name}, {"sha256", results.set_sha256}}},
+                {"problems", results.problems},
+                {"planners", results.planners},
+                {"machine", results.by_family.sweeps.machine},
+                {"summary", sweep::to_json(results.by_family)},
+                {"ablations", std::move(ablations)}};
+  if (!results.contacts.empty()) document["contacts"] = contacts_json(results);
+  return document;
 }
 
 std::string to_table(const Results& results, bool markdown) {
   const auto text = [markdown](const TextTable& table) {
     return markdown ? to_markdown(table) : hamelin::to_text(table);
   };
-  std::string all = text(family_table(results)) + "\n" + text(planner_table(results));
+  const bool moving = !results.contacts.empty();
+  std::string all = text(moving ? cell_table(results) : family_table(results)) + "\n" +
+                    text(planner_table(results));
+  if (moving) all += "\n" + text(contact_table(results));
   if (!results.ablations.empty()) all += "\n" + text(ablation_table(results));
   return all;
 }

@@ -43,7 +43,7 @@ Results results_of(const std::vector<Pair>& pairs) {
     sweeps.runs.push_back(run_of(problem, "p:turn=false", pair.without_s, pair.contact_without));
   }
   sweeps.ablations = {{"p", "p:turn=false", "turn", false}};
-  Results results{"set", std::string(64, '0'), {}, {"p", "p:turn=false"}, {}, {}, {}};
+  Results results{"set", std::string(64, '0'), {}, {"p", "p:turn=false"}, {}, {}, {}, {}};
   results.by_family = sweep::merge(std::move(sweeps), {"family", "planner"});
   results.by_planner = sweep::group(results.by_family.sweeps.runs, {"planner"});
   results.ablations = sweep::compare_ablations(results.by_family.sweeps);

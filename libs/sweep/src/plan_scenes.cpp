@@ -89,9 +89,10 @@ void PlanScenes::add_file(const fs::path& file) {
     const std::string name = file.stem().string();
     const std::string goal =
         scene.goals.empty() ? "none" : std::string(scene::type_name(scene.goals.front()));
-    add_scene_file(
-        name, file,
-        {{"family", name}, {"problem", name}, {"goal", goal}, {"map", map_label(scene)}});
+    Labels labels{{"family", name}, {"problem", name}, {"goal", goal}, {"map", map_label(scene)}};
+    if (const auto given = options_.labels.find(name); given != options_.labels.end())
+      for (const auto& [label, value] : given->second) labels[label] = value;
+    add_scene_file(name, file, std::move(labels));
   } else if (document.is_object() && !document.contains("schema") &&
              document.contains("obstacles")) {
     add_problem(file, document);

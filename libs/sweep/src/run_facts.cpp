@@ -31,6 +31,7 @@ void read_result(const Json& result, bool timing, RunFacts& facts) {
   facts.recovery_work_J = number_at(result, "recovery_work_J");
   facts.filter_work_J = number_at(result, "filter_work_J");
   facts.torque_change_mean = number_at(member(result, "torque_change"), "mean");
+  facts.contact_arm_speed_m_s = number_at(member(result, "mover_contact"), "arm_speed_m_s");
   if (const Json& plant = member(result, "plant"); plant.is_object())
     facts.plant_contacts = number_at(plant, "contacts").value_or(0.0);
   if (const Json& escape = member(result, "escape"); escape.is_object())

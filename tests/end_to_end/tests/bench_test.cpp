@@ -129,6 +129,49 @@ TEST_CASE("planners are compared with themselves without a part", "[end_to_end]"
   CHECK(sandbox.has("page.html"));
 }
 
+TEST_CASE("problems with moving obstacles are scenes that run", "[end_to_end]") {
+  Sandbox sandbox;
+  const Json made = test::run_json(sandbox, {"bench", "make", "--problems", "moving", "--family",
+                                             "people", "--per-cell", "1", "-o", "scenes"});
+  CHECK(made["set"] == "hamelin-moving-1");
+  CHECK(made["problems"] == 6);
+  const std::string scene = "scenes/people-1-025-01.json";
+  CHECK(sandbox.run({"validate", scene}).exit_code == 0);
+  const auto run =
+      sandbox.run({"run", scene, "--set", "/duration_s=0.05", "--result", "result.json"});
+  CAPTURE(run.err);
+  CHECK(run.exit_code == 1);
+  CHECK(sandbox.json("result.json")["outcome"] == "timeout");
+}
+
+TEST_CASE("planners run with moving obstacles, as drawn and with another prediction",
+          "[end_to_end]") {
+  Sandbox sandbox;
+  const Strings command{"bench",        "run",    "--problems",   "moving",
+                        "--per-family", "1",      "--family",     "people,pendulums",
+                        "--planner",    "hybrid", "--planner",    "template",
+                        "--prediction", "drawn",  "--prediction", "speed-bound",
+                        "--duration",   "1",      "-o",           "results"};
+  const auto output = sandbox.run(command);
+  CAPTURE(output.err);
+  REQUIRE(output.exit_code == 0);
+  CHECK_THAT(line_of(output.out, "family"),
+             Catch::Contains("hybrid  template  hybrid, speed-bound  template, speed-bound"));
+  CHECK_THAT(line_of(output.out, "pendulums"), Catch::Contains("/1"));
+  CHECK_THAT(line_of(output.out, "contacts of"), Catch::Contains("arm at rest"));
+  const auto checked = sandbox.run({"validate", "results/benchmark.json", "data/bench/moving.json",
+                                    "results/plan.json", "results/records.jsonl"});
+  CAPTURE(checked.err);
+  CHECK(checked.exit_code == 0);
+  const Json results = sandbox.json("results/benchmark.json");
+  CHECK(results["set"]["name"] == "hamelin-moving-1");
+  CHECK(results["problems"] == Json{"people-1-025-01", "pendulums-2-030-01"});
+  CHECK(results["planners"].size() == 4);
+  CHECK(results["contacts"].size() == 4);
+  CHECK(results["summary"]["groups"].size() == 8);
+  CHECK(sandbox.run({"bench", "table", "--problems", "moving", "results"}).out == output.out);
+}
+
 TEST_CASE("wrong command lines and changed sets of the benchmark end with one line",
           "[end_to_end]") {
   Sandbox sandbox;
@@ -169,6 +212,13 @@ TEST_CASE("wrong command lines and changed sets of the benchmark end with one li
         "hybrid", "--planner", "template", "--ablate", "steering"},
        "planner 'template' has no parameter 'steering'"},
       {{"bench", "run", "-o", "out", "--expect-gain"}, "--expect-gain: has no effect"},
+      {{"bench", "run", "-o", "out", "--prediction", "path"}, "--prediction: has no effect"},
+      {{"bench", "run", "-o", "out", "--explain"}, "--explain: has no effect"},
+      {{"bench", "run", "-o", "out", "--problems", "moving", "--goal", "pose"},
+       "--goal: has no effect"},
+      {{"bench", "run", "-o", "out", "--problems", "moving", "--family", "shelf"},
+       "expected one of cubes, people, pendulums"},
+      {{"bench", "make", "-o", "out", "--problems", "moved"}, "bench/moved.json"},
       {{"bench", "table", "data"}, "data/plan.json"},
       {{"bench", "draw", "-o", "set.json", "--name", "x", "--robot", "absent.urdf"},
        "absent.urdf"}};

@@ -60,9 +60,9 @@ class JudgedArm {
   std::vector<std::pair<std::size_t, std::size_t>> self_pairs_;
 };
 
-/// Signed distance of a point from an obstacle at a time [m]; minus the depth if the point is
+/// Signed distance of a point from an obstacle at a pose [m]; minus the depth if the point is
 /// inside.
-[[nodiscard]] double distance_from(const scene::Obstacle& obstacle, double time_s,
+[[nodiscard]] double distance_from(const scene::Obstacle& obstacle, const geometry::SE3& pose,
                                    const Eigen::Vector3d& p);
 
 /// The occupied leaves of a map at a time, as OctoMap itself lists them. Changes of the scene's map

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -49,6 +50,9 @@ struct SphereOnPath {
 /// Scenes from GainScenes are also combined with each gain set.
 struct PlanOptions {
   std::vector<std::filesystem::path> files;    ///< problems and scenes, distinguished by content
+  /// Labels of the runs of scene files, by the names of the files without extension; they replace
+  /// those that follow from the file.
+  std::map<std::string, std::map<std::string, std::string>> labels;
   scene::ProblemOptions problem;               ///< `output` is not used
   std::vector<scene::GoalType> goals;          ///< of problems; empty: joint
   std::optional<SphereOnPath> sphere_on_path;  ///< problems get a path goal; `goals` is not used

@@ -18,6 +18,8 @@ struct RunFacts {
   std::string contact;          ///< judged_contact()
   double contact_time_s = 0.0;  ///< judged_contact_time()
   bool judge_saw_contact = false;
+  /// Speed of the arm where it touched an obstacle that moves or appears [m/s].
+  std::optional<double> contact_arm_speed_m_s;
   bool judged = false;  ///< whether the judge measured a distance
   std::optional<double> time_s, certified_share;
   std::optional<double> clearance_m, self_clearance_m;  ///< the judge's
