@@ -32,16 +32,16 @@ Json primitive_json(const scene::Obstacle& o) {
 Json problem_entry(const Problem& problem) {
   Json path = Json::array();
   for (Eigen::Index i = 0; i < problem.path.cols(); ++i) path.push_back(list(problem.path.col(i)));
+  const bool moving = is_moving(problem.family);
   Json entry{{"name", problem.name},
              {"family", problem.family},
              {"seed", problem.seed},
-             {"sha256", problem.sha256},
-             {"path", std::move(path)}};
-  if (is_moving(problem.family)) {
+             {"sha256", problem.sha256}};
+  if (!moving) entry["map_sha256"] = problem.map_sha256;
+  entry["path"] = std::move(path);
+  if (moving) {
     entry["obstacles"] = problem.obstacles;
     entry["speed_max_m_s"] = problem.speed_max_m_s;
-  } else {
-    entry["map_sha256"] = problem.map_sha256;
   }
   return entry;
 }
@@ -96,17 +96,14 @@ std::string to_text(const ProblemSet& set, const fs::path& directory) {
   }
   if (!set.robot.tip.empty()) robot["tip"] = set.robot.tip;
   const DrawCounts& drawn = set.drawn;
-  Json head{{"schema", "hamelin.problems/1"},
-            {"name", set.name},
-            {"robot", std::move(robot)},
-            {"clearance_m", set.clearance_m},
-            {"self_clearance_m", set.self_clearance_m},
-            {"drawn",
-             {{"candidates", drawn.candidates},
-              {"no_start_or_goal", drawn.no_start_or_goal},
-              {"straight_is_free", drawn.straight_is_free},
-              {"path_unknown", drawn.path_unknown}}}};
+  Json head{{"schema", "hamelin.problems/1"}, {"name", set.name}, {"robot", std::move(robot)}};
   if (set.resolution_m > 0.0) head["resolution_m"] = set.resolution_m;
+  head["clearance_m"] = set.clearance_m;
+  head["self_clearance_m"] = set.self_clearance_m;
+  head["drawn"] = {{"candidates", drawn.candidates},
+                   {"no_start_or_goal", drawn.no_start_or_goal},
+                   {"straight_is_free", drawn.straight_is_free},
+                   {"path_unknown", drawn.path_unknown}};
   if (drawn.no_room > 0) head["drawn"]["no_room"] = drawn.no_room;
   // One line per problem.
   std::string text = head.dump(1);

@@ -23,30 +23,31 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path source_dir = HAMELIN_SOURCE_DIR;
-const fs::path published = source_dir / "data" / "bench" / "moving.json";
+const fs::path sources = HAMELIN_SOURCE_DIR;
+const fs::path moving_file = sources / "data" / "bench" / "moving.json";
 // As docs/benchmark.md publishes it. It changes only with the name of the set.
-const std::string published_sha256 = "SHA";
+const std::string moving_sha256 = "SHA";
 
-const ProblemSet& set() {
-  static const ProblemSet read = read_problem_set(published);
+const ProblemSet& moving_set() {
+  static const ProblemSet read = read_problem_set(moving_file);
   return read;
 }
 
 const sweep::JudgedArm& arm() {
-  static const sweep::JudgedArm judged = judged_arm(set().robot);
+  static const sweep::JudgedArm judged = judged_arm(moving_set().robot);
   return judged;
 }
 
 std::vector<Problem> first_of_each_cell(std::size_t count) {
   Selection selection;
   selection.per_cell = count;
-  return select(set(), selection);
+  return select(moving_set(), selection);
 }
 
 scene::Scene scene_of(const Problem& problem, const fs::path& folder) {
   return scene::read_scene(
-      write_moving_scenes(set(), {problem}, {std::nullopt}, folder, published.string()).front());
+      write_moving_scenes(moving_set(), {problem}, {std::nullopt}, folder, moving_file.string())
+          .front());
 }
 
 // The points of an obstacle that are fastest: corners of a box, ends of a capsule. The surface of a
@@ -82,16 +83,16 @@ double sampled_speed(const scene::Obstacle& o, double until_s) {
 }  // namespace
 
 TEST_CASE("the published set of moving obstacles has not changed", "[bench][unit]") {
-  CHECK(set().sha256 == published_sha256);
-  CHECK_THAT(read_file(source_dir / "docs" / "benchmark.md"), Catch::Contains(published_sha256));
-  CHECK(to_text(set(), published.parent_path()) == read_file(published));
+  CHECK(moving_set().sha256 == moving_sha256);
+  CHECK_THAT(read_file(sources / "docs" / "benchmark.md"), Catch::Contains(moving_sha256));
+  CHECK(to_text(moving_set(), moving_file.parent_path()) == read_file(moving_file));
   std::map<std::string, std::size_t> count;
-  for (const auto& problem : set().problems) ++count[problem.family];
+  for (const auto& problem : moving_set().problems) ++count[problem.family];
   for (const auto& family : moving_families()) CHECK(count[family] == 10 * cells(family).size());
 }
 
 TEST_CASE("problems with moving obstacles are made with the published bytes", "[bench][unit]") {
-  for (const auto& problem : first_of_each_cell(2)) {
+  for (const auto& problem : first_of_each_cell(1)) {
     CAPTURE(problem.name);
     CHECK(sha256_hex(moving_problem_text(problem, arm())) == problem.sha256);
   }
@@ -139,6 +140,8 @@ TEST_CASE("cubes stay in the workspace and away from the base of the arm", "[ben
   const test::TemporaryFolder folder;
   // half the time of a turn at the largest speed: the centre cuts corners by less
   constexpr double corner_s = 0.06;
+  // by which curves between way-points may leave the lines and turns that they are made from
+  constexpr double curve_m = 5e-3;
   for (const auto& problem : first_of_each_cell(1)) {
     if (problem.family != "cubes") continue;
     CAPTURE(problem.name);
@@ -151,10 +154,10 @@ TEST_CASE("cubes stay in the workspace and away from the base of the arm", "[ben
       double way_m = 0.0;
       for (double t = 0.0; t <= 10.0; t += 0.01) {
         const Vector3d p = scene::motion_at(cube, t).pose.p(), center(0.0, 0.0, 0.267);
-        REQUIRE((p - center).norm() <= 1.5 + 1e-3);
-        REQUIRE(p.z() >= -1e-3);
-        REQUIRE((p - center).norm() >= base_m - corner_m);
-        if (p.z() < center.z()) REQUIRE(p.head<2>().norm() >= base_m - corner_m);
+        REQUIRE((p - center).norm() <= 1.5 + curve_m);
+        REQUIRE(p.z() >= -curve_m);
+        REQUIRE((p - center).norm() >= base_m - corner_m - curve_m);
+        if (p.z() < center.z()) REQUIRE(p.head<2>().norm() >= base_m - corner_m - curve_m);
         way_m += (scene::motion_at(cube, t + 0.01).pose.p() - p).norm();
       }
       // A cube moves all the time, at its own speed but for turns.
@@ -173,7 +176,7 @@ TEST_CASE("people and pendulums never touch an arm that stays at its start or go
     for (const Eigen::VectorXd& q :
          {Eigen::VectorXd(problem.path.leftCols(1)), Eigen::VectorXd(problem.path.rightCols(1))}) {
       sweep::Judge judge(scene);
-      for (double t = 0.0; t < scene.duration_s; t += 0.02) judge.add_node(t, q);
+      for (double t = 0.0; t < scene.duration_s; t += 0.04) judge.add_node(t, q);
       CHECK(judge.verdict().obstacles->clearance_m > 0.02);
     }
   }
@@ -183,13 +186,13 @@ TEST_CASE("the obstacles are in the way: the straight joint motion meets some of
           "[bench][unit]") {
   const test::TemporaryFolder folder;
   std::size_t met = 0, all = 0;
-  for (const auto& problem : first_of_each_cell(2)) {
+  for (const auto& problem : first_of_each_cell(1)) {
     if (problem.obstacles == 0) continue;
     ++all;
     sweep::Judge judge(scene_of(problem, folder.path()));
     constexpr double duration_s = 4.0;
-    for (int i = 0; i <= 200; ++i) {
-      const double s = i / 200.0;
+    for (int i = 0; i <= 100; ++i) {
+      const double s = i / 100.0;
       judge.add_node(s * duration_s,
                      (1.0 - s) * problem.path.leftCols(1) + s * problem.path.rightCols(1));
     }
@@ -204,10 +207,11 @@ TEST_CASE("another prediction changes what planners are told and nothing else", 
   Selection selection;
   selection.families = {"pendulums"};
   selection.per_family = 1;
-  const auto problems = select(set(), selection);
-  const auto files = write_moving_scenes(
-      set(), problems, {std::nullopt, scene::Prediction::path, scene::Prediction::speed_bound},
-      folder.path(), published.string());
+  const auto problems = select(moving_set(), selection);
+  const auto files =
+      write_moving_scenes(moving_set(), problems,
+                          {std::nullopt, scene::Prediction::path, scene::Prediction::speed_bound},
+                          folder.path(), moving_file.string());
   REQUIRE(files.size() == 3);
   CHECK(files[2].filename() == problems[0].name + "-speed-bound.json");
   Json drawn = read_json(files[0]), told = read_json(files[2]);
@@ -224,8 +228,8 @@ TEST_CASE("another prediction changes what planners are told and nothing else", 
 TEST_CASE("sets say which problems have maps, and changed seeds are refused", "[bench][unit]") {
   const test::TemporaryFolder folder;
   for (const char* file : {"robots/desk6.urdf", "robots/desk6.spheres.json"})
-    folder.put(file, read_file(source_dir / "data" / file));
-  const fs::path copy = folder.put("bench/moving.json", read_file(published));
+    folder.put(file, read_file(sources / "data" / file));
+  const fs::path copy = folder.put("bench/moving.json", read_file(moving_file));
   Json document = read_json(copy);
   document["problems"][0]["map_sha256"] = std::string(64, '0');
   folder.put("bench/moving.json", document.dump());
