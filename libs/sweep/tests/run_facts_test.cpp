@@ -21,6 +21,7 @@ Json record() {
             {"torque_change", {{"mean", 0.25}, {"max", 3.0}}},
             {"plant", {{"type", "mujoco"}, {"contacts", 2}}},
             {"escape", {{"count", 2}, {"strategy", "tree"}}},
+            {"mover_contact", {{"obstacle", "ball"}, {"arm_speed_m_s", 0.5}}},
             {"timing", {{"cpu_s", 0.1}, {"tick_us", {{"p50", 4.0}, {"p99", 9.0}}}}}}},
           {"judge",
            {{"contact", true},
@@ -45,6 +46,7 @@ TEST_CASE("the facts of a record have the members that are shown", "[sweep][unit
   CHECK(facts.contact_time_s == 1.5);
   CHECK(facts.judge_saw_contact);
   CHECK(facts.judged);
+  CHECK(facts.contact_arm_speed_m_s == 0.5);
   CHECK(facts.time_s == 2.5);
   CHECK(facts.certified_share == 0.75);
   CHECK(facts.clearance_m == -0.001);

@@ -172,6 +172,30 @@ TEST_CASE("planners run with moving obstacles, as drawn and with another predict
   CHECK(sandbox.run({"bench", "table", "--problems", "moving", "results"}).out == output.out);
 }
 
+TEST_CASE("contacts with moving obstacles are counted and explained", "[end_to_end]") {
+  Sandbox sandbox;
+  // Without a shield the template drives into the first pendulum.
+  Strings command{
+      "bench",     "run",       "--problems", "moving", "--per-family",      "1",  "--family",
+      "pendulums", "--planner", "template",   "--set",  "/safety/type=none", "-o", "results"};
+  const auto counted = sandbox.run(command);
+  CAPTURE(counted.err);
+  REQUIRE(counted.exit_code == 0);
+  const Json before = sandbox.json("results/benchmark.json")["contacts"][0];
+  CHECK(before["arm_moves"] == 1);
+  CHECK(before["arm_at_rest"] == 0);
+  CHECK(before["avoidable"] == 0);
+  CHECK_FALSE(sandbox.has("results/contacts"));
+  command.emplace_back("--explain");
+  const auto explained = sandbox.run(command);
+  CAPTURE(explained.err);
+  REQUIRE(explained.exit_code == 0);
+  CHECK(sandbox.json("results/benchmark.json")["contacts"][0]["avoidable"] == 1);
+  CHECK(sandbox.run({"validate", "results/benchmark.json"}).exit_code == 0);
+  CHECK(sandbox.run({"bench", "table", "--problems", "moving", "results"}).out == explained.out);
+  CHECK(explained.out != counted.out);
+}
+
 TEST_CASE("wrong command lines and changed sets of the benchmark end with one line",
           "[end_to_end]") {
   Sandbox sandbox;
