@@ -49,7 +49,7 @@ struct SphereOnPath {
 /// Contents of a plan: each scene × each planner × each combination of varied values × each seed.
 /// Scenes from GainScenes are also combined with each gain set.
 struct PlanOptions {
-  std::vector<std::filesystem::path> files;    ///< problems and scenes, distinguished by content
+  std::vector<std::filesystem::path> files;  ///< problems and scenes, distinguished by content
   /// Labels of the runs of scene files, by the names of the files without extension; they replace
   /// those that follow from the file.
   std::map<std::string, std::map<std::string, std::string>> labels;
