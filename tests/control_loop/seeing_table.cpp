@@ -132,9 +132,8 @@ void measure(const scene::Scene& scene, double seconds, bool sees) {
   camera->join();
   std::vector<double> delay_ms;
   for (const Seen& seen : camera->seen()) {
-    const auto known =
-        std::find_if(ticks.begin(), ticks.end(),
-                     [&](const auto& tick) { return tick.second >= seen.snapshot; });
+    const auto known = std::find_if(ticks.begin(), ticks.end(),
+                                    [&](const auto& tick) { return tick.second >= seen.snapshot; });
     if (known != ticks.end() && known->first > seen.there)
       delay_ms.push_back(
           std::chrono::duration<double, std::milli>(known->first - seen.there).count());

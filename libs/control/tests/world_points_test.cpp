@@ -49,8 +49,8 @@ control::PointFrame wall_at(double x, double time_s = 0.0) {
   control::PointFrame frame;
   frame.points.resize(3, 400);
   for (int i = 0; i < 400; ++i)
-    frame.points.col(i) = Vector3d(x + 0.013, -0.187 + 0.02 * (i % 20), 0.413 + 0.02 * (i / 20))
-                              .cast<float>();
+    frame.points.col(i) =
+        Vector3d(x + 0.013, -0.187 + 0.02 * (i % 20), 0.413 + 0.02 * (i / 20)).cast<float>();
   frame.sensor = {};
   frame.time_s = time_s;
   // points are given in the sensor's frame, which is turned as the world is
@@ -147,7 +147,8 @@ TEST_CASE("the map of many frames equals OctoMap's own insertion, voxel by voxel
   }
 }
 
-TEST_CASE("a map that was read is seen before, and changes with what is seen", "[control][points]") {
+TEST_CASE("a map that was read is seen before, and changes with what is seen",
+          "[control][points]") {
   Room room;
   room.scene.map->file = data / "maps" / "shelf.bt";
   room.make();
@@ -277,9 +278,8 @@ TEST_CASE("a ball that moves becomes an obstacle with its velocity, and the map 
     ball.pose = {Eigen::Matrix3d::Identity(), center(time_s)};
     control::PointFrame frame;
     // the ball comes into a room that was seen to be free
-    frame.points = renderer.render(at, k < 3 ? std::vector<sensing::DepthRenderer::Solid>{}
-                                             : std::vector{ball},
-                                   rng);
+    frame.points = renderer.render(
+        at, k < 3 ? std::vector<sensing::DepthRenderer::Solid>{} : std::vector{ball}, rng);
     frame.sensor = at;
     frame.time_s = time_s;
     frame.range_m = camera.range_m;
@@ -339,8 +339,7 @@ TEST_CASE("frames that make no sense are refused in one line, and the world is u
   frame = wall_at(0.6);
   frame.sensor = {Eigen::Matrix3d::Identity(), {nan, 0.0, 0.0}};
   refused(frame, "points: the sensor's pose is not finite");
-  for (int k = 0; k <= 2000; ++k)
-    room.world->note_posture(5.0 + 0.001 * k, room.scene.start_q, 0);
+  for (int k = 0; k <= 2000; ++k) room.world->note_posture(5.0 + 0.001 * k, room.scene.start_q, 0);
   refused(wall_at(0.6, 7.5), "points: seen at 7.5 s, expected at most 0.01 s after the last tick");
   refused(wall_at(0.6, 6.0), "points: seen at 6 s, 1 s before the last tick, expected at most 0.5");
   CHECK(room.world->latest()->number == 0);

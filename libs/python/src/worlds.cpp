@@ -17,9 +17,9 @@ const std::filesystem::path& folder_of(const BoundWorld& w) {
   return w.owner->scene->folder;
 }
 
-using Points = py::array_t<float, py::array::c_style | py::array::forcecast>;
+using PointArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
 
-control::PointFrame frame_of(const Points& points, py::handle pose, double time_s,
+control::PointFrame frame_of(const PointArray& points, py::handle pose, double time_s,
                              const std::string& mount, double range_m) {
   if (points.ndim() != 2 || points.shape(1) != 3)
     throw Error(ErrorCode::usage, "insert_points: points: expected an array of shape (N, 3)");
@@ -29,12 +29,12 @@ control::PointFrame frame_of(const Points& points, py::handle pose, double time_
   frame.time_s = time_s;
   frame.range_m = range_m;
   constexpr std::array mounts{scene::Mount::world, scene::Mount::base, scene::Mount::tip};
-  const auto* const found = std::find_if(mounts.begin(), mounts.end(), [&](scene::Mount m) {
-    return scene::to_string(m) == mount;
-  });
+  const auto* const found = std::find_if(
+      mounts.begin(), mounts.end(), [&](scene::Mount m) { return scene::to_string(m) == mount; });
   if (found == mounts.end())
-    throw Error(ErrorCode::usage, fmt::format(
-        "insert_points: mount: '{}' given, expected 'world', 'base' or 'tip'", mount));
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("insert_points: mount: '{}' given, expected 'world', 'base' or 'tip'", mount));
   frame.mount = *found;
   return frame;
 }
@@ -124,7 +124,7 @@ void add_world(py::module_& module) {
           "time_s may be left out and is not used.")
       .def(
           "insert_points",
-          [](const BoundWorld& w, const Points& points, py::handle pose, double time_s,
+          [](const BoundWorld& w, const PointArray& points, py::handle pose, double time_s,
              const std::string& mount, std::int32_t source, double range_m) {
             control::PointFrame frame = frame_of(points, pose, time_s, mount, range_m);
             frame.source = source;
@@ -149,7 +149,8 @@ void add_world(py::module_& module) {
           "in the sensor's frame, finite [m]. pose: of the sensor in the frame of its mount,\n"
           "\"world\", \"base\" or \"tip\", shape (4, 4). time: when they were seen [s]. source:\n"
           "the same for all frames of a sensor. range: of points that are farther only the way up\n"
-          "to there is free [m]. Points on the arm, its load or a known obstacle are left out, rays\n"
+          "to there is free [m]. PointArray on the arm, its load or a known obstacle are left out, "
+          "rays\n"
           "to the others free what they pass, and bodies that move become obstacles.\n"
           "Returns the number of the snapshot that knows the frame, and counts of points and\n"
           "voxels.")

@@ -403,6 +403,60 @@ void subtract(std::vector<VoxelBox>& boxes, const VoxelBox& hole) {
               boxes.begin() + static_cast<std::ptrdiff_t>(count));
 }
 
+namespace {
+
+VoxelBox common(const VoxelBox& a, const VoxelBox& b) {
+  VoxelBox out;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    out.lo[axis] = std::max(a.lo[axis], b.lo[axis]);
+    out.hi[axis] = std::min(a.hi[axis], b.hi[axis]);
+  }
+  return out;
+}
+
+// Calls f(x0, x1, y, z) for each row of a part of a tile.
+template <class F>
+void each_row(const VoxelBox& part, const std::array<std::int32_t, 3>& origin, const F& f) {
+  for (std::int32_t z = part.lo[2]; z < part.hi[2]; ++z)
+    for (std::int32_t y = part.lo[1]; y < part.hi[1]; ++y)
+      f(part.lo[0] - origin[0], part.hi[0] - origin[0], y - origin[1], z - origin[2]);
+}
+
+}  // namespace
+
+std::vector<VoxelBox> without(const VoxelBox& box, std::span<const VoxelBox> holes) {
+  constexpr std::size_t few = 8;
+  std::vector<VoxelBox> rest{box};
+  if (holes.size() <= few) {
+    for (const VoxelBox& hole : holes) subtract(rest, hole);
+    return rest;
+  }
+  // what is about the holes is cut out, drawn, and joined again
+  VoxelBox about = common(box, holes[0]);
+  for (const VoxelBox& hole : holes)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      about.lo[axis] = std::min(about.lo[axis], std::max(hole.lo[axis], box.lo[axis]));
+      about.hi[axis] = std::max(about.hi[axis], std::min(hole.hi[axis], box.hi[axis]));
+    }
+  subtract(rest, about);
+  BitGrid grid;
+  std::array<std::int32_t, 3> origin{};
+  for (origin[2] = about.lo[2]; origin[2] < about.hi[2]; origin[2] += tile)
+    for (origin[1] = about.lo[1]; origin[1] < about.hi[1]; origin[1] += tile)
+      for (origin[0] = about.lo[0]; origin[0] < about.hi[0]; origin[0] += tile) {
+        const VoxelBox window{origin, {origin[0] + tile, origin[1] + tile, origin[2] + tile}},
+            part = common(about, window);
+        each_row(part, origin, [&](auto... row) { grid.set_row(row...); });
+        for (const VoxelBox& hole : holes)
+          if (overlap(hole, part))
+            each_row(common(hole, part), origin, [&](auto... row) { grid.clear_row(row...); });
+        const VoxelBox used{
+            {0, 0, 0}, {part.hi[0] - origin[0], part.hi[1] - origin[1], part.hi[2] - origin[2]}};
+        extract_blocks(grid, used, origin, rest);
+      }
+  return rest;
+}
+
 std::vector<VoxelBox> surface(const std::vector<VoxelBox>& boxes) {
   std::vector<VoxelBox> faces;
   for (std::size_t axis = 0; axis < 3; ++axis) {

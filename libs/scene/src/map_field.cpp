@@ -21,8 +21,7 @@ std::vector<Box> in_metres(const std::vector<VoxelBox>& voxels, double resolutio
 
 }  // namespace
 
-MapField::MapField(const std::vector<Cell>& cells, double resolution,
-                   const Eigen::Vector3d& origin)
+MapField::MapField(const std::vector<Cell>& cells, double resolution, const Eigen::Vector3d& origin)
     : resolution_(resolution),
       origin_(origin),
       boxes_(in_metres(merge(cells), resolution), origin),
@@ -58,13 +57,14 @@ MapField::Changed MapField::change(const std::vector<VoxelBox>& add,
   std::stable_sort(cuts.begin(), cuts.end(),
                    [](const auto& x, const auto& y) { return x.first < y.first; });
   std::vector<std::vector<VoxelBox>> rest;
-  for (const auto& [box, hole] : cuts) {
-    if (cut.empty() || cut.back() != box) {
-      cut.push_back(box);
-      rest.push_back({voxels_of(box)});
-      changed.removed += voxels_in(rest.back());
-    }
-    subtract(rest.back(), *hole);
+  std::vector<VoxelBox> holes;
+  for (std::size_t i = 0; i < cuts.size();) {
+    const std::int32_t box = cuts[i].first;
+    holes.clear();
+    for (; i < cuts.size() && cuts[i].first == box; ++i) holes.push_back(*cuts[i].second);
+    cut.push_back(box);
+    changed.removed += voxels_in({voxels_of(box)});
+    rest.push_back(without(voxels_of(box), holes));
   }
   for (const auto& pieces : rest) changed.removed -= voxels_in(pieces);
   // The second tree gets the boxes of earlier additions that were not cut, the remaining pieces,

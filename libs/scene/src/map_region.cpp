@@ -166,9 +166,9 @@ Shares shares_within_reach(const MapSpec& map, const geometry::SE3& base, double
 MapData read_map(const MapSpec& map, const Ball& ball) {
   if (!map.file.empty()) return read_map(map.file, {map.scale, map.occupancy_threshold});
   if (!(map.resolution_m > 0.0) || !std::isfinite(map.resolution_m))
-    throw Error(ErrorCode::invalid,
-                fmt::format("map: resolution_m: {} m given, expected a number above 0",
-                            map.resolution_m));
+    throw Error(
+        ErrorCode::invalid,
+        fmt::format("map: resolution_m: {} m given, expected a number above 0", map.resolution_m));
   MapData data;
   data.file = "map without a file";
   data.resolution = map.resolution_m;

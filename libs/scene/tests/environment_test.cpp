@@ -156,7 +156,8 @@ TEST_CASE("in a map without a file all is unknown", "[scene][unit]") {
   CHECK(clearance(UnknownPolicy::free, 0.0) == 0.5);
   CHECK(clearance(UnknownPolicy::block, 0.0) < -0.2);
   // the voxels that the ball touches are free
-  const double beyond_m = 0.6 - at[0].norm() - radius[0], there = clearance(UnknownPolicy::block, 0.6);
+  const double beyond_m = 0.6 - at[0].norm() - radius[0],
+               there = clearance(UnknownPolicy::block, 0.6);
   CHECK(there >= beyond_m);
   CHECK(there < beyond_m + 0.02 * std::sqrt(3.0));
   MapSpec map;

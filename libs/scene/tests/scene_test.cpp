@@ -378,7 +378,8 @@ TEST_CASE("a self-filter may be true, false or a padding", "[scene][unit]") {
 
 TEST_CASE("maps that sensors make, and sensors, are read and read back", "[scene][unit]") {
   Json document = small_document();
-  document["map"] = {{"resolution_m", 0.02}, {"unknown", "block"}, {"points", {{"margin_m", 0.01}}}};
+  document["map"] = {
+      {"resolution_m", 0.02}, {"unknown", "block"}, {"points", {{"margin_m", 0.01}}}};
   document["sensors"] = {{{"type", "depth"},
                           {"mount", "tip"},
                           {"position_m", {0.0, 0.1, 0.05}},

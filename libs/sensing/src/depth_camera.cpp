@@ -48,8 +48,8 @@ void check(const DepthCamera& camera) {
   };
   constexpr int pixels_max = 2'000'000;
   if (camera.width < 1 || camera.height < 1 || camera.height > pixels_max / camera.width)
-    refuse(fmt::format("{} × {} pixels, expected 1 to {}", camera.width, camera.height,
-                       pixels_max));
+    refuse(
+        fmt::format("{} × {} pixels, expected 1 to {}", camera.width, camera.height, pixels_max));
   if (!(camera.fov_rad > 0.0 && camera.fov_rad < std::numbers::pi))
     refuse(fmt::format("a field of view of {} rad, expected one between 0 and π", camera.fov_rad));
   if (!(camera.range_m > 0.0 && std::isfinite(camera.range_m)))
@@ -108,8 +108,7 @@ const Eigen::Matrix3Xf& DepthRenderer::render(const geometry::SE3& camera,
     for (const Solid& solid : solids)
       distance = distance_to(solid, camera.p(), direction, distance);
     if (map_)
-      distance = std::min(distance,
-                          distance_in_map(camera.p(), camera.p() + distance * direction));
+      distance = std::min(distance, distance_in_map(camera.p(), camera.p() + distance * direction));
     if (distance > camera_.range_m)
       distance = beyond * camera_.range_m;
     else if (camera_.noise_m > 0.0)

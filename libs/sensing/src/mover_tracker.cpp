@@ -51,8 +51,8 @@ std::vector<MoverTracker::Cluster> MoverTracker::clusters_of(
     if (loose[static_cast<std::size_t>(i)] == 0) continue;
     CellKey key;
     for (std::size_t a = 0; a < 3; ++a)
-      key[a] = static_cast<std::int32_t>(std::floor(
-          static_cast<double>(points(static_cast<Index>(a), i)) / options_.apart_m));
+      key[a] = static_cast<std::int32_t>(
+          std::floor(static_cast<double>(points(static_cast<Index>(a), i)) / options_.apart_m));
     cells[key].push_back(i);
   }
   std::map<CellKey, std::size_t> index;
@@ -132,8 +132,8 @@ MoverTracker::Update MoverTracker::update(double time_s, const geometry::SE3& se
                    size = cluster.high - cluster.low;
     Track* const track = nearest(center, time_s, assigned);
     if (track == nullptr) {
-      tracks_.push_back({next_id_++, false, 1, axes, center, Vector3d::Zero(), size, center, time_s,
-                         time_s});
+      tracks_.push_back(
+          {next_id_++, false, 1, axes, center, Vector3d::Zero(), size, center, time_s, time_s});
       continue;
     }
     assigned[static_cast<std::size_t>(track - tracks_.data())] = 1;
@@ -146,8 +146,8 @@ MoverTracker::Update MoverTracker::update(double time_s, const geometry::SE3& se
     out.movers.push_back({track->id, {track->axes, track->center}, track->size, track->velocity});
   }
   std::erase_if(tracks_, [&](const Track& track) {
-    const bool gone = time_s - track.seen_s > options_.lost_s ||
-                      time_s - track.anchored_s > options_.still_s;
+    const bool gone =
+        time_s - track.seen_s > options_.lost_s || time_s - track.anchored_s > options_.still_s;
     if (gone && track.moves) out.gone.push_back(track.id);
     return gone;
   });

@@ -101,7 +101,7 @@ OccupancyGrid::OccupancyGrid(double resolution_m, const scene::VoxelBox& box,
                        voxels_max));
   stride_ = {1, 64 * std::int64_t{words_}, 64 * words_ * size[1]};
   const auto words = static_cast<std::size_t>(words_ * size[1] * size[2]);
-  for (Bits* bits : {&known_, &occupied_, &passed_, &hit_}) bits->words.assign(words, 0);
+  for (Bits* bits : {&known_, &occupied_, &least_, &passed_, &hit_}) bits->words.assign(words, 0);
   const auto blocks = [](std::int64_t n) {
     return static_cast<std::size_t>((n + Block::edge - 1) / Block::edge);
   };
@@ -203,6 +203,8 @@ std::uint64_t OccupancyGrid::update(std::size_t word, std::uint64_t free, std::u
     value = std::clamp(before + ((occupied & bit) != 0 ? model_.hit : model_.miss), model_.least,
                        model_.most);
     now = value >= model_.occupied ? now | bit : now & ~bit;
+    least_.words[word] =
+        value <= model_.least ? least_.words[word] | bit : least_.words[word] & ~bit;
   }
   return now;
 }
@@ -211,9 +213,11 @@ std::uint64_t OccupancyGrid::update(std::size_t word, std::uint64_t free, std::u
 void OccupancyGrid::apply() {
   rows_.clear();
   for (std::size_t word = 0; word < passed_.words.size(); ++word) {
-    const std::uint64_t hit = hit_.words[word], passed = passed_.words[word] & ~hit;
-    if ((hit | passed) == 0) continue;
+    // another miss changes nothing of a voxel that is as free as it can be
+    const std::uint64_t hit = hit_.words[word],
+                        passed = passed_.words[word] & ~hit & ~least_.words[word];
     hit_.words[word] = passed_.words[word] = 0;
+    if ((hit | passed) == 0) continue;
     const std::uint64_t known = known_.words[word], before = occupied_.words[word],
                         now = update(word, passed, hit), learned = (hit | passed) & ~known;
     known_.words[word] = known | learned;
@@ -247,6 +251,7 @@ void OccupancyGrid::set(std::size_t word, std::uint64_t mask, State state) {
   };
   change(known_, state != State::unknown);
   change(occupied_, state == State::occupied);
+  change(least_, state == State::free);
   const Voxel first = first_of(word);
   Block* const block = blocks_[block_of(first)].get();
   if (block == nullptr) return;
@@ -293,7 +298,7 @@ float OccupancyGrid::log_odds(const Voxel& voxel) const {
 }
 
 std::size_t OccupancyGrid::bytes() const noexcept {
-  std::size_t sum = 4 * known_.words.size() * sizeof(std::uint64_t);
+  std::size_t sum = 5 * known_.words.size() * sizeof(std::uint64_t);
   for (const auto& block : blocks_)
     if (block) sum += sizeof(Block);
   return sum;

@@ -19,8 +19,7 @@ void add_ball(const Vector3d& center, double radius, Rng& noise, Eigen::Matrix3X
     const double z = 2.0 * (static_cast<double>(i) + 0.5) / count - 1.0,
                  angle = 2.4 * static_cast<double>(i), around = std::sqrt(1.0 - z * z);
     const Vector3d n(-std::abs(around * std::cos(angle)), around * std::sin(angle), z);
-    points.col(before + i) =
-        (center + (radius + 0.003 * noise.normal()) * n).cast<float>();
+    points.col(before + i) = (center + (radius + 0.003 * noise.normal()) * n).cast<float>();
   }
 }
 

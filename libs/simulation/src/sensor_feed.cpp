@@ -22,9 +22,8 @@ SensorFeed::SensorFeed(const scene::Scene& scene, const model::Model& model)
       sees_map_(std::none_of(scene.obstacles.begin(), scene.obstacles.end(),
                              [](const auto& o) { return o.judge_only; })) {
   for (const scene::SensorSpec& spec : scene.sensors)
-    cameras_.push_back(
-        {spec, sensing::DepthRenderer(
-                   {spec.width, spec.height, spec.fov_rad, spec.range_m, spec.noise_m})});
+    cameras_.push_back({spec, sensing::DepthRenderer({spec.width, spec.height, spec.fov_rad,
+                                                      spec.range_m, spec.noise_m})});
 }
 
 void SensorFeed::see_solids(double time_s, control::WorldView& truth) {
@@ -77,9 +76,9 @@ void SensorFeed::advance(double time_s, control::WorldView& truth, control::Cont
     ++camera.frames;
     see_solids(time_s, truth);
     Pending fresh{time_s + camera.spec.delay_s, camera.spec.name, look(camera, time_s, truth)};
-    const auto after =
-        std::find_if(pending_.begin(), pending_.end(),
-                     [&](const Pending& other) { return other.due_s > fresh.due_s; });
+    const auto after = std::find_if(pending_.begin(), pending_.end(), [&](const Pending& other) {
+      return other.due_s > fresh.due_s;
+    });
     pending_.insert(after, std::move(fresh));
   }
 }

@@ -198,7 +198,8 @@ Judge::Judge(const scene::Scene& scene)
   poses_.resize(obstacles_.size());
   const bool exact =
       std::any_of(obstacles_.begin(), obstacles_.end(), [](const auto& o) { return o.judge_only; });
-  if (scene.map && !scene.map->file.empty() && (!exact || !scene.map->changes.empty())) map_ = JudgedMap(scene, arm_);
+  if (scene.map && !scene.map->file.empty() && (!exact || !scene.map->changes.empty()))
+    map_ = JudgedMap(scene, arm_);
   if (exact) map_.clear();
   nearby_.resize(arm_.balls().size());
 }

@@ -74,8 +74,7 @@ void SensedMap::note_fresh(const OccupancyGrid::Row& row, double time_s) {
 }
 
 scene::MapChange SensedMap::insert(const Eigen::Ref<const Eigen::Matrix3Xf>& points,
-                                   const Eigen::Vector3d& origin, double range_m,
-                                   double time_s) {
+                                   const Eigen::Vector3d& origin, double range_m, double time_s) {
   scene::MapChange change;
   std::erase_if(fresh_, [&](const auto& entry) { return time_s - entry.second > fresh_s; });
   for (const OccupancyGrid::Row& row : grid_.insert(points, origin.cast<float>(), range_m)) {

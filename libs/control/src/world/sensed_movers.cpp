@@ -33,7 +33,8 @@ bool SensedMovers::follows(std::int32_t source, const std::string& obstacle) con
 Update SensedMovers::take(const PointFrame& frame, const geometry::SE3& sensor,
                           const Eigen::Ref<const Eigen::Matrix3Xf>& points,
                           std::span<const std::uint8_t> loose) {
-  const auto [entry, fresh] = sensors_.try_emplace(frame.source, Sensor{sensing::MoverTracker(), frame.time_s, {}});
+  const auto [entry, fresh] =
+      sensors_.try_emplace(frame.source, Sensor{sensing::MoverTracker(), frame.time_s, {}});
   Sensor& state = entry->second;
   // the first frame has nothing to compare with, and frames may overtake each other
   if (!fresh && frame.time_s <= state.last_s) return {};

@@ -26,8 +26,8 @@ class SensedMovers {
                                      std::span<const std::uint8_t> loose);
   /// Tells the world. Bodies for which it has no room are not followed.
   /// @return the number of the snapshot that knows them
-  std::uint64_t tell(const PointFrame& frame,
-                                    const sensing::MoverTracker::Update& update, World& world);
+  std::uint64_t tell(const PointFrame& frame, const sensing::MoverTracker::Update& update,
+                     World& world);
 
  private:
   struct Body {

@@ -50,7 +50,7 @@ geometry::SE3 mount_of(scene::Mount mount, const model::Model& model,
   refuse("the sensor's mount is unknown, expected the world, the base or the tip");
 }
 
-// Moves points that are not on the arm, in none of its postures, to the front.
+// Moves points that are not on the arm, in none of its postures, to the front: docs/theory.md (20.3).
 Eigen::Index remove_arms(const model::Model& model, const std::vector<Eigen::VectorXd>& postures,
                          double margin_m, dynamics::Workspace& ws, Matrix3Xf& points) {
   Eigen::Index kept = points.cols();
@@ -68,8 +68,7 @@ Eigen::Index remove_arms(const model::Model& model, const std::vector<Eigen::Vec
 }
 
 // Moves points that are not on a known obstacle, at their time, to the front.
-Eigen::Index remove_obstacles(const scene::Environment& environment, double time_s,
-                              double margin_m,
+Eigen::Index remove_obstacles(const scene::Environment& environment, double time_s, double margin_m,
                               const std::function<bool(const scene::Obstacle&)>& is_known,
                               Eigen::Ref<Matrix3Xf> points) {
   Eigen::Index kept = points.cols();
@@ -135,9 +134,10 @@ World::SeenArm World::arm_seen_by(const PointFrame& frame, const scene::PointsSp
                        frame.time_s, ahead_max_s, newest->time_s));
   const auto at_time = age_s <= spec.age_max_s ? postures_->at(frame.time_s) : std::nullopt;
   if (!at_time)
-    refuse(fmt::format("seen at {} s, {:.3g} s before the last tick, expected at most {} s, and "
-                       "that the arm's posture then is known",
-                       frame.time_s, age_s, spec.age_max_s));
+    refuse(
+        fmt::format("seen at {} s, {:.3g} s before the last tick, expected at most {} s, and "
+                    "that the arm's posture then is known",
+                    frame.time_s, age_s, spec.age_max_s));
   SeenArm seen;
   {
     const std::lock_guard lock(loads_mutex_);
@@ -199,9 +199,10 @@ FrameReport World::insert_points(const PointFrame& frame) {
   const geometry::SE3 map_from_world = environment.map_pose().inverse();
   const Eigen::Vector3d origin = map_from_world * seen.sensor.p();
   if (sensed_->occupied(origin))
-    refuse(fmt::format("seen from ({:.4g}, {:.4g}, {:.4g}) m in the map, which is occupied, "
-                       "expected a sensor in free or unknown space",
-                       origin.x(), origin.y(), origin.z()));
+    refuse(
+        fmt::format("seen from ({:.4g}, {:.4g}, {:.4g}) m in the map, which is occupied, "
+                    "expected a sensor in free or unknown space",
+                    origin.x(), origin.y(), origin.z()));
   Matrix3Xf points = seen.points;
   transform(map_from_world, points);
   sensing::MoverTracker::Update moving;

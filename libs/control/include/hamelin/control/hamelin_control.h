@@ -402,8 +402,8 @@ int32_t hamelin_controller_set_map(hamelin_controller* controller, const char* f
 int32_t hamelin_controller_set_map_json(hamelin_controller* controller, const char* map_json,
                                         const char* folder, const double* q, uint64_t* snapshot,
                                         char* error, size_t error_size);
-/* Makes what a depth sensor saw part of the map: points on the arm, its load or a known obstacle are
- * left out, and rays to the others free what they pass; see World::insert_points. report may be
+/* Makes what a depth sensor saw part of the map: points on the arm, its load or a known obstacle
+ * are left out, and rays to the others free what they pass; see World::insert_points. report may be
  * null. Takes some 25 ms for 320 x 240 points. */
 int32_t hamelin_controller_insert_points(hamelin_controller* controller,
                                          const hamelin_point_frame* frame,

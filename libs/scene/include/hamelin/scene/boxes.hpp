@@ -77,6 +77,11 @@ void join(std::vector<VoxelBox>& boxes);
 /// Removes `hole` from the boxes; each box that overlaps it is replaced by at most six pieces.
 void subtract(std::vector<VoxelBox>& boxes, const VoxelBox& hole);
 
+/// Disjoint boxes with what remains of a box without holes, which may overlap each other and its
+/// faces. Many holes are drawn into bit grids, so time grows with their number and with the volume
+/// about them.
+[[nodiscard]] std::vector<VoxelBox> without(const VoxelBox& box, std::span<const VoxelBox> holes);
+
 /// The surface of the union of disjoint boxes, as rectangles: boxes without extent along one axis.
 /// Where two boxes touch there is no surface. These are the rectangles F of docs/theory.md (11.5).
 [[nodiscard]] std::vector<VoxelBox> surface(const std::vector<VoxelBox>& boxes);

@@ -45,7 +45,8 @@ class DepthRenderer {
                                  Rng& noise);
 
  private:
-  [[nodiscard]] double distance_in_map(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
+  [[nodiscard]] double distance_in_map(const Eigen::Vector3d& from,
+                                       const Eigen::Vector3d& to) const;
 
   DepthCamera camera_;
   Eigen::Matrix3Xd rays_;  ///< of the pixels in the camera's frame, unit

@@ -10,14 +10,14 @@ namespace hamelin::sensing {
 
 /// What counts as a body that moves.
 struct MoverOptions {
-  double apart_m = 0.05;         ///< points that are farther from each other are of two bodies
-  std::size_t points_min = 8;    ///< of a body in a frame
-  std::size_t frames_min = 3;    ///< in which a body is seen before it counts as moving
-  double moved_min_m = 0.05;     ///< by which its centre has moved until then
-  double size_max_m = 1.5;       ///< larger ones are not followed
-  double speed_max_m_s = 3.0;    ///< faster ones are taken for others
-  double still_s = 1.0;          ///< after so long within moved_min_m it stands still
-  double lost_s = 0.5;           ///< after so long without being seen it is gone
+  double apart_m = 0.05;       ///< points that are farther from each other are of two bodies
+  std::size_t points_min = 8;  ///< of a body in a frame
+  std::size_t frames_min = 3;  ///< in which a body is seen before it counts as moving
+  double moved_min_m = 0.05;   ///< by which its centre has moved until then
+  double size_max_m = 1.5;     ///< larger ones are not followed
+  double speed_max_m_s = 3.0;  ///< faster ones are taken for others
+  double still_s = 1.0;        ///< after so long within moved_min_m it stands still
+  double lost_s = 0.5;         ///< after so long without being seen it is gone
 };
 
 /// Finds bodies that move among the points of frames, and follows them from frame to frame:

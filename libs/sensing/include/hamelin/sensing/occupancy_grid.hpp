@@ -100,8 +100,8 @@ class OccupancyGrid {
   std::int32_t words_ = 0;                ///< per row
   std::array<std::size_t, 3> block_count_{};
   std::vector<std::unique_ptr<Block>> blocks_;
-  Bits known_, occupied_;
-  Bits passed_, hit_;  ///< by the rays of the frame
+  Bits known_, occupied_, least_;  ///< least_: as free as it can be
+  Bits passed_, hit_;              ///< by the rays of the frame
   std::unique_ptr<EndPoints> ends_;
   std::vector<kernel::BoxRay> rays_;
   std::vector<Row> rows_;
