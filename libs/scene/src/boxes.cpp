@@ -12,6 +12,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/scene/distance.hpp"
+#include "voxel_boxes.hpp"
 
 namespace hamelin::scene {
 
@@ -405,15 +406,6 @@ void subtract(std::vector<VoxelBox>& boxes, const VoxelBox& hole) {
 
 namespace {
 
-VoxelBox common(const VoxelBox& a, const VoxelBox& b) {
-  VoxelBox out;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    out.lo[axis] = std::max(a.lo[axis], b.lo[axis]);
-    out.hi[axis] = std::min(a.hi[axis], b.hi[axis]);
-  }
-  return out;
-}
-
 // Calls f(x0, x1, y, z) for each row of a part of a tile.
 template <class F>
 void each_row(const VoxelBox& part, const std::array<std::int32_t, 3>& origin, const F& f) {
@@ -432,12 +424,8 @@ std::vector<VoxelBox> without(const VoxelBox& box, std::span<const VoxelBox> hol
     return rest;
   }
   // what is about the holes is cut out, drawn, and joined again
-  VoxelBox about = common(box, holes[0]);
-  for (const VoxelBox& hole : holes)
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      about.lo[axis] = std::min(about.lo[axis], std::max(hole.lo[axis], box.lo[axis]));
-      about.hi[axis] = std::max(about.hi[axis], std::min(hole.hi[axis], box.hi[axis]));
-    }
+  VoxelBox about;
+  for (const VoxelBox& hole : holes) about = hull(about, common(box, hole));
   subtract(rest, about);
   BitGrid grid;
   std::array<std::int32_t, 3> origin{};

@@ -8,6 +8,7 @@
 
 #include "hamelin/core/isa_kernels.hpp"
 #include "hamelin/scene/kernel/distance_transform.hpp"
+#include "voxel_boxes.hpp"
 
 namespace hamelin::scene {
 
@@ -22,32 +23,8 @@ constexpr double unit_voxels = cap / 65535.0;  // of stored distances
 constexpr double bound_rounding = 1e-9;        // in voxels
 constexpr std::size_t padding = 2;             // values behind the last one, for wide loads
 
-bool is_empty(const VoxelBox& box) {
-  return box.lo[0] >= box.hi[0] || box.lo[1] >= box.hi[1] || box.lo[2] >= box.hi[2];
-}
-
 bool same(const VoxelBox& a, const VoxelBox& b) {
   return a.lo == b.lo && a.hi == b.hi;
-}
-
-VoxelBox common(const VoxelBox& a, const VoxelBox& b) {
-  VoxelBox out;
-  for (std::size_t i = 0; i < 3; ++i) {
-    out.lo[i] = std::max(a.lo[i], b.lo[i]);
-    out.hi[i] = std::min(a.hi[i], b.hi[i]);
-  }
-  return out;
-}
-
-VoxelBox hull(const VoxelBox& a, const VoxelBox& b) {
-  if (is_empty(a)) return b;
-  if (is_empty(b)) return a;
-  VoxelBox out;
-  for (std::size_t i = 0; i < 3; ++i) {
-    out.lo[i] = std::min(a.lo[i], b.lo[i]);
-    out.hi[i] = std::max(a.hi[i], b.hi[i]);
-  }
-  return out;
 }
 
 VoxelBox widened(const VoxelBox& box, std::int32_t by) {
