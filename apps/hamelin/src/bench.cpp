@@ -347,7 +347,6 @@ void add_run_command(CLI::App& parent, int& exit_code) {
       parent, "run",
       "Run planners with the problems of a set, print a table of the results and write them to "
       "DIR/benchmark.json. Resumes where it stopped if it was interrupted",
-      "hamelin bench run --planner hybrid --planner apf --per-family 1 -o quick\n"
       "hamelin bench run --planner hybrid+rrt-connect --planner python:mine.py:Mine -o full\n"
       "hamelin bench run --ablate steering --ablate escape=none --per-family 2 -o parts\n"
       "hamelin bench run --problems moving --per-cell 1 --explain -o moving");

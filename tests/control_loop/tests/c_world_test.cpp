@@ -253,7 +253,7 @@ TEST_CASE("points from C become part of the map, and what makes no sense is refu
   document["map"] = {{"resolution_m", 0.02}};
   CLoop loop(document);
   (void)loop.tick();
-  const float points[] = {0.613F, 0.5F, 0.6F, 0.613F, 0.52F, 0.6F};
+  const float points[] = {0.613F, 0.51F, 0.61F, 0.613F, 0.53F, 0.61F};
   hamelin_point_frame frame{};
   frame.struct_size = sizeof frame;
   frame.points_m = points;
