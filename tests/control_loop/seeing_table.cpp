@@ -37,17 +37,30 @@ void print(const char* what, std::vector<double> ms) {
              ms.back());
 }
 
-// What a camera beside the shelf sees from places a little apart, with noise.
+sensing::DepthRenderer::Solid wall(const Eigen::Vector3d& size, const Eigen::Vector3d& at) {
+  sensing::DepthRenderer::Solid out;
+  out.shape.shape = scene::Shape::box;
+  out.shape.size_m = size;
+  out.pose = {Eigen::Matrix3d::Identity(), at};
+  return out;
+}
+
+// What a camera beside the shelf sees from places a little apart, with noise, in a room with a
+// floor and walls.
 std::vector<control::PointFrame> frames_of(const scene::Scene& scene, const model::Model& arm) {
   sensing::DepthRenderer renderer({.fov_rad = 1.2, .noise_m = 0.002});
   renderer.set_map(scene::make_environment(scene, arm, control::default_influence_m));
+  const std::vector<sensing::DepthRenderer::Solid> room{wall({6.0, 6.0, 0.1}, {0.0, 0.0, -0.053}),
+                                                        wall({0.1, 6.0, 3.0}, {1.517, 0.0, 1.5}),
+                                                        wall({6.0, 0.1, 3.0}, {0.0, 1.513, 1.5}),
+                                                        wall({6.0, 0.1, 3.0}, {0.0, -1.516, 1.5})};
   Rng rng(1);
   std::vector<control::PointFrame> frames(10);
   for (control::PointFrame& frame : frames) {
     Eigen::Matrix3d R;
     R << 0, -0.6, 0.8, -1, 0, 0, 0, -0.8, -0.6;  // looks forward and down
     frame.sensor = {R, {-0.3 + rng.uniform(-0.02, 0.02), rng.uniform(-0.02, 0.02), 1.4}};
-    frame.points = renderer.render(frame.sensor, {}, rng);
+    frame.points = renderer.render(frame.sensor, room, rng);
     frame.range_m = 3.0;
   }
   return frames;
