@@ -104,7 +104,7 @@ class World {
   /// docs/theory.md (20.1). What all frames since set_map() or change_map() told is kept; before
   /// them, the map is as sure as scene::PointsSpec lets it be.
   /// Bodies that move become obstacles, "mover SOURCE.ID", which later frames move.
-  /// Takes some 25 ms for 320 × 240 points; other updates than those of the map need not wait.
+  /// Takes some 0.1 s for 320 × 240 points; other updates than those of the map need not wait.
   /// @throws Error invalid, "points: …", for a frame that check() refuses, if there is no map, for
   ///         a time that is after that of the last tick by more than 10 ms or before it by more
   ///         than scene::PointsSpec::age_max_s, and for a sensor that is in an occupied voxel; nothing
