@@ -12,7 +12,7 @@ using Update = sensing::MoverTracker::Update;
 
 namespace {
 
-// By as much a box is larger than what was seen of a body [m], so that it need not grow often.
+// By so much a box is larger than what was seen of a body [m], so that it need not grow often.
 constexpr double room_m = 0.04;
 // From so many poses on the world knows the velocity of a body better than the tracker.
 constexpr int poses_min = 4;

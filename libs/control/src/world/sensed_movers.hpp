@@ -18,7 +18,7 @@ class SensedMovers {
   /// Whether an obstacle is a body that this sensor follows.
   [[nodiscard]] bool follows(std::int32_t source, const std::string& obstacle) const;
 
-  /// Finds bodies among the points of a frame, and removes those points.
+  /// Finds bodies among the points of a frame; nothing in a frame that another one has overtaken.
   /// @param points, loose, sensor see MoverTracker::update(); in the world
   /// @return what the world is to be told
   sensing::MoverTracker::Update take(const PointFrame& frame, const geometry::SE3& sensor,
