@@ -73,6 +73,10 @@ class CapsuleSet {
 constexpr std::int32_t tile = 256;
 constexpr std::int32_t wide = 32;
 
+std::int32_t first_of_tile(std::int32_t voxel) {
+  return (voxel + (1 << 20)) / tile * tile - (1 << 20);
+}
+
 // Bits of one tile, x running fastest.
 class BitGrid {
  public:
@@ -347,7 +351,7 @@ std::vector<VoxelBox> merge(const std::vector<Cell>& cells) {
     }
     std::array<std::int32_t, 3> origin{};
     for (std::size_t axis = 0; axis < 3; ++axis)
-      origin[axis] = (cell.lo[axis] + (1 << 20)) / tile * tile - (1 << 20);
+      origin[axis] = first_of_tile(cell.lo[axis]);
     tiles[origin].push_back(cell);
   }
   if (!tiles.empty()) {
@@ -445,50 +449,92 @@ std::vector<VoxelBox> without(const VoxelBox& box, std::span<const VoxelBox> hol
   return rest;
 }
 
+namespace {
+
+// Rectangles in a plane as boxes of one voxel along z.
+using Flat = VoxelBox;
+
+// Calls f with the tiles that a rectangle touches.
+template <class F>
+void each_tile(const Flat& flat, const F& f) {
+  for (std::int32_t y = first_of_tile(flat.lo[1]); y < flat.hi[1]; y += tile)
+    for (std::int32_t x = first_of_tile(flat.lo[0]); x < flat.hi[0]; x += tile)
+      f(std::array<std::int32_t, 3>{x, y, 0});
+}
+
+// Disjoint rectangles with what is in some of `of` and in none of `covers`, all of them in one
+// plane. Few are cut to pieces; many are drawn.
+void uncovered(const std::vector<Flat>& of, const std::vector<Flat>& covers, BitGrid& grid,
+               std::vector<Flat>& out) {
+  constexpr std::size_t few = 64;
+  if (of.size() * covers.size() <= few) {
+    for (const Flat& flat : of) {
+      std::vector<Flat> pieces{flat};
+      for (const Flat& cover : covers) subtract(pieces, cover);
+      out.insert(out.end(), pieces.begin(), pieces.end());
+    }
+    return;
+  }
+  struct Drawn {
+    std::vector<const Flat*> of, covers;
+  };
+  std::map<std::array<std::int32_t, 3>, Drawn> tiles;
+  for (const Flat& flat : of)
+    each_tile(flat, [&](const auto& at) { tiles[at].of.push_back(&flat); });
+  for (const Flat& cover : covers)
+    each_tile(cover, [&](const auto& at) {
+      if (const auto found = tiles.find(at); found != tiles.end())
+        found->second.covers.push_back(&cover);
+    });
+  for (const auto& [origin, drawn] : tiles) {
+    const VoxelBox window{origin, {origin[0] + tile, origin[1] + tile, 1}};
+    VoxelBox used;
+    for (const Flat* flat : drawn.of) {
+      const VoxelBox part = common(*flat, window);
+      each_row(part, origin, [&](auto... row) { grid.set_row(row...); });
+      used = hull(used, part);
+    }
+    for (const Flat* cover : drawn.covers)
+      each_row(common(*cover, window), origin, [&](auto... row) { grid.clear_row(row...); });
+    for (std::size_t i = 0; i < 2; ++i) {
+      used.lo[i] -= origin[i];
+      used.hi[i] -= origin[i];
+    }
+    extract_blocks(grid, used, origin, out);
+  }
+}
+
+}  // namespace
+
 std::vector<VoxelBox> surface(const std::vector<VoxelBox>& boxes) {
   std::vector<VoxelBox> faces;
+  BitGrid grid;
+  std::vector<Flat> bare;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::size_t u = (axis + 1) % 3;
-    // Faces by plane, upper and lower ones separately. With a width of one voxel they overlap as
-    // boxes do.
+    const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
+    // of boxes that end, and that begin, at each plane
     struct Side {
-      std::vector<VoxelBox> up, down;
+      std::vector<Flat> up, down;
     };
     std::map<std::int32_t, Side> planes;
     for (const VoxelBox& box : boxes) {
-      const auto face = [&](std::int32_t at) {
-        VoxelBox flat = box;
-        flat.lo[axis] = at;
-        flat.hi[axis] = at + 1;
-        return flat;
-      };
-      planes[box.hi[axis]].up.push_back(face(box.hi[axis]));
-      planes[box.lo[axis]].down.push_back(face(box.lo[axis]));
+      const Flat flat{{box.lo[u], box.lo[v], 0}, {box.hi[u], box.hi[v], 1}};
+      planes[box.hi[axis]].up.push_back(flat);
+      planes[box.lo[axis]].down.push_back(flat);
     }
-    const auto by_u = [&](const VoxelBox& a, const VoxelBox& b) { return a.lo[u] < b.lo[u]; };
-    std::vector<VoxelBox> pieces;
-    const auto expose = [&](const std::vector<VoxelBox>& of, std::vector<VoxelBox>& covers) {
-      std::sort(covers.begin(), covers.end(), by_u);
-      std::int32_t widest = 0;
-      for (const VoxelBox& cover : covers) widest = std::max(widest, cover.hi[u] - cover.lo[u]);
-      for (const VoxelBox& face : of) {
-        pieces.assign(1, face);
-        VoxelBox from = face;
-        from.lo[u] -= widest;
-        for (auto cover = std::lower_bound(covers.begin(), covers.end(), from, by_u);
-             cover != covers.end() && cover->lo[u] < face.hi[u]; ++cover)
-          if (overlap(*cover, face)) subtract(pieces, *cover);
-        for (VoxelBox& piece : pieces) {
-          piece.hi[axis] = piece.lo[axis];
-          faces.push_back(piece);
-        }
+    for (const auto& [at, sides] : planes) {
+      bare.clear();
+      uncovered(sides.up, sides.down, grid, bare);
+      uncovered(sides.down, sides.up, grid, bare);
+      for (const Flat& flat : bare) {
+        VoxelBox face;
+        face.lo[axis] = face.hi[axis] = at;
+        face.lo[u] = flat.lo[0];
+        face.hi[u] = flat.hi[0];
+        face.lo[v] = flat.lo[1];
+        face.hi[v] = flat.hi[1];
+        faces.push_back(face);
       }
-    };
-    for (auto& plane : planes) {
-      Side& sides = plane.second;
-      std::vector<VoxelBox> up = sides.up;
-      expose(sides.up, sides.down);
-      expose(sides.down, up);
     }
   }
   return faces;

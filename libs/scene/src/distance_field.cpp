@@ -176,17 +176,26 @@ VoxelGrid::VoxelGrid(const VoxelBox& box) : box_(box), words_((box.hi[0] - box.l
                static_cast<std::size_t>(box.hi[2] - box.lo[2]));
 }
 
+std::pair<std::int32_t, std::int32_t> VoxelGrid::words_of(const VoxelBox& inside) const {
+  return {(inside.lo[0] - box_.lo[0]) / 64, (inside.hi[0] - 1 - box_.lo[0]) / 64};
+}
+
+std::uint64_t VoxelGrid::bits_of(const VoxelBox& inside, std::int32_t word) const {
+  const std::int32_t from = box_.lo[0] + 64 * word;
+  const auto before = static_cast<unsigned>(std::max(0, inside.lo[0] - from)),
+             behind = static_cast<unsigned>(std::max(0, from + 64 - inside.hi[0]));
+  return (~std::uint64_t{0} << before) & (~std::uint64_t{0} >> behind);
+}
+
 template <class Changed>
 void VoxelGrid::set(const VoxelBox& voxels, bool occupied, const Changed& changed) {
   const VoxelBox inside = common(voxels, box_);
   if (is_empty(inside)) return;
-  const std::int32_t first = inside.lo[0] - box_.lo[0], last = inside.hi[0] - 1 - box_.lo[0];
+  const auto [first, last] = words_of(inside);
   for (std::int32_t z = inside.lo[2]; z < inside.hi[2]; ++z)
     for (std::int32_t y = inside.lo[1]; y < inside.hi[1]; ++y)
-      for (std::int32_t word = first / 64; word <= last / 64; ++word) {
-        std::uint64_t mask = ~std::uint64_t{0};
-        if (word == first / 64) mask &= ~std::uint64_t{0} << static_cast<unsigned>(first % 64);
-        if (word == last / 64) mask &= ~std::uint64_t{0} >> static_cast<unsigned>(63 - last % 64);
+      for (std::int32_t word = first; word <= last; ++word) {
+        const std::uint64_t mask = bits_of(inside, word);
         std::uint64_t& bits = bits_[row(y, z) + static_cast<std::size_t>(word)];
         const std::uint64_t different = (occupied ? ~bits : bits) & mask;
         if (different == 0) continue;
@@ -197,6 +206,22 @@ void VoxelGrid::set(const VoxelBox& voxels, bool occupied, const Changed& change
 
 void VoxelGrid::set(const VoxelBox& voxels) {
   set(voxels, true, [](std::int32_t, std::int32_t, std::int32_t, std::uint64_t) {});
+}
+
+void VoxelGrid::clear(const VoxelBox& voxels) {
+  set(voxels, false, [](std::int32_t, std::int32_t, std::int32_t, std::uint64_t) {});
+}
+
+bool VoxelGrid::any(const VoxelBox& voxels) const {
+  const VoxelBox inside = common(voxels, box_);
+  if (is_empty(inside)) return false;
+  const auto [first, last] = words_of(inside);
+  for (std::int32_t z = inside.lo[2]; z < inside.hi[2]; ++z)
+    for (std::int32_t y = inside.lo[1]; y < inside.hi[1]; ++y)
+      for (std::int32_t word = first; word <= last; ++word)
+        if ((bits_[row(y, z) + static_cast<std::size_t>(word)] & bits_of(inside, word)) != 0)
+          return true;
+  return false;
 }
 
 void VoxelGrid::copy(const VoxelGrid& other) {

@@ -159,7 +159,9 @@ std::shared_ptr<const DistanceField> Environment::distance_field() const {
 
 void Environment::update_field(const MapChange& change) {
   const std::shared_ptr<LazyField> before = std::exchange(field_, std::make_shared<LazyField>());
-  if (!before->made || !before->field) return;
+  // Where voxels change everywhere, to update it takes as long as to make it, if it is needed.
+  constexpr std::size_t few = 64;
+  if (!before->made || !before->field || change.free.size() + change.occupied.size() > few) return;
   // Another environment, or whoever asked for the field, may still use it.
   const bool own = before.use_count() == 1 && before->field.use_count() == 1;
   auto field = own ? before->field : std::make_shared<DistanceField>(*before->field);

@@ -19,6 +19,9 @@ HAMELIN_SELECT_KERNELS(WalkKernels, walk_kernels)
 
 namespace {
 
+// So many rays fit into a cache.
+constexpr std::size_t rays_together = 512;
+
 constexpr std::int64_t voxels_max = std::int64_t{1} << 32;
 
 // The log-odds of a voxel that no frame has told about.
@@ -144,19 +147,24 @@ void OccupancyGrid::free_along(const Eigen::Vector3f& origin, const Eigen::Vecto
   Ray ray(origin, end, resolution_);
   while (!ray.done() && !contains(ray.voxel())) ray.advance();
   if (ray.done()) return;
-  kernel::BoxRay out{ray.next(), ray.apart(), ray.length(), bit_of(ray.voxel()), {}, 0, {}, {}};
-  std::array<std::int64_t, 3> way{}, step{};
+  kernel::BoxRay out{ray.next(), ray.apart(), ray.length(), bit_of(ray.voxel()), {}, -1, 0, {}};
+  std::array<std::int64_t, 3> left{};
   for (std::size_t i = 0; i < 3; ++i) {
-    step[i] = ray.step(i);
-    way[i] = ray.end()[i] - ray.voxel()[i];
-    out.bit_step[i] = stride_[i] * step[i];
+    out.bit_step[i] = stride_[i] * ray.step(i);
     // a ray that has left the box does not return
-    out.left[i] = step[i] > 0 ? box_.hi[i] - ray.voxel()[i] : ray.voxel()[i] - box_.lo[i] + 1;
+    left[i] = ray.step(i) > 0 ? box_.hi[i] - 1 - ray.voxel()[i] : ray.voxel()[i] - box_.lo[i];
   }
-  out.way = kernel::BoxRay::packed(way[0], way[1], way[2]);
-  out.way_step = {kernel::BoxRay::packed(step[0], 0, 0), kernel::BoxRay::packed(0, step[1], 0),
-                  kernel::BoxRay::packed(0, 0, step[2])};
+  using Packed = kernel::BoxRay;
+  out.left = Packed::packed(left[0], left[1], left[2]);
+  out.left_step = {Packed::packed(1, 0, 0), Packed::packed(0, 1, 0), Packed::packed(0, 0, 1)};
+  if (contains(ray.end())) out.end_bit = bit_of(ray.end());
   rays_.push_back(out);
+  if (rays_.size() == rays_together) walk_rays();
+}
+
+void OccupancyGrid::walk_rays() {
+  kernel::select_walk_kernels(default_isa()).walk(rays_.data(), rays_.size(), passed_.words.data());
+  rays_.clear();
 }
 
 void OccupancyGrid::mark(const Eigen::Ref<const Eigen::Matrix3Xf>& points,
@@ -186,7 +194,7 @@ void OccupancyGrid::mark(const Eigen::Ref<const Eigen::Matrix3Xf>& points,
       if (has_key(end, voxels_per_m)) free_along(origin, end);
     }
   }
-  kernel::select_walk_kernels(default_isa()).walk(rays_.data(), rays_.size(), passed_.words.data());
+  walk_rays();
 }
 
 std::uint64_t OccupancyGrid::update(std::size_t word, std::uint64_t free, std::uint64_t occupied) {

@@ -1,9 +1,11 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
-#include <unordered_map>
+#include <deque>
+#include <utility>
 #include <vector>
 
+#include "hamelin/scene/distance_field.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/sensing/occupancy_grid.hpp"
 
@@ -21,7 +23,7 @@ class SensedMap {
   /// Per point of the map's frame: whether it is where nothing stood for long, and what does is not
   /// next to it.
   [[nodiscard]] std::vector<std::uint8_t> loose(const Eigen::Ref<const Eigen::Matrix3Xf>& points,
-                                                double time_s) const;
+                                                double time_s);
 
   /// Takes a frame, see OccupancyGrid::insert(). @return what changes in the map
   [[nodiscard]] scene::MapChange insert(const Eigen::Ref<const Eigen::Matrix3Xf>& points,
@@ -31,16 +33,18 @@ class SensedMap {
  private:
   using Voxel = sensing::OccupancyGrid::Voxel;
   [[nodiscard]] Voxel voxel_of(const Eigen::Vector3d& p) const;
-  /// Whether something stands there, and has for long.
-  [[nodiscard]] bool stands(const Voxel& voxel, double time_s) const;
-  void note_fresh(const sensing::OccupancyGrid::Row& row, double time_s);
+  void note_change(const sensing::OccupancyGrid::Row& row, double time_s);
+  /// What became occupied long before stands now, if it is occupied.
+  void age(double time_s);
   void add_runs(const sensing::OccupancyGrid::Row& row, std::uint64_t bits,
                 std::vector<scene::VoxelBox>& out) const;
 
   scene::Ball ball_;  ///< beyond which the map does not matter
   bool unknown_matters_;
   sensing::OccupancyGrid grid_;
-  std::unordered_map<std::uint64_t, double> fresh_;  ///< when voxels that were free became occupied
+  scene::VoxelGrid standing_;  ///< occupied, and so for long
+  /// Runs of voxels that were free and became occupied, and when.
+  std::deque<std::pair<double, scene::VoxelBox>> fresh_;
 };
 
 }  // namespace hamelin::control

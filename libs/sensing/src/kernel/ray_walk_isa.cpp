@@ -28,7 +28,7 @@ HAMELIN_INLINE Doubles masked(Doubles x, Integers mask) {
 
 struct Rays {
   Doubles next[3], apart[3], length;
-  Integers bit, bit_step[3], way, way_step[3], left[3], walks;
+  Integers bit, bit_step[3], end_bit, left, left_step[3], walks;
 };
 
 // The first `count` rays, from 1 to `lanes`; the other lanes repeat the last one.
@@ -42,12 +42,12 @@ HAMELIN_INLINE Rays load(const BoxRay* rays, std::size_t count) {
       out.next[i][j] = ray.next[i];
       out.apart[i][j] = ray.apart[i];
       out.bit_step[i][j] = ray.bit_step[i];
-      out.way_step[i][j] = ray.way_step[i];
-      out.left[i][j] = ray.left[i];
+      out.left_step[i][j] = ray.left_step[i];
     }
     out.length[j] = ray.length;
     out.bit[j] = ray.bit;
-    out.way[j] = ray.way;
+    out.end_bit[j] = ray.end_bit;
+    out.left[j] = ray.left;
   }
   out.walks = Integers{} - 1;
   return out;
@@ -62,17 +62,16 @@ void walk(const BoxRay* rays, std::size_t count, std::uint64_t* bits) noexcept {
       const Integers x = (r.next[0] < r.next[1]) & (r.next[0] < r.next[2]),
                      y = ~(r.next[0] < r.next[1]) & (r.next[1] < r.next[2]), z = ~(x | y);
       const Integers across[3] = {x & r.walks, y & r.walks, z & r.walks};
-      Integers bit = r.bit, ended = Integers{};
+      Integers bit = r.bit;
       for (int i = 0; i < 3; ++i) {
         r.next[i] += masked(r.apart[i], across[i]);
         bit += across[i] & r.bit_step[i];
-        r.way -= across[i] & r.way_step[i];
-        r.left[i] += across[i];
-        ended |= r.left[i] == 0;
+        r.left -= across[i] & r.left_step[i];
       }
       Doubles nearest = r.next[0] < r.next[1] ? r.next[0] : r.next[1];
       nearest = nearest < r.next[2] ? nearest : r.next[2];
-      ended |= (r.way == 0) | (nearest > r.length);
+      const Integers ended =
+          ((r.left & left_box) != 0) | (bit == r.end_bit) | (nearest > r.length);
       r.walks &= ~ended;
       r.bit = (bit & r.walks) | (r.bit & ~r.walks);  // that of a ray that has ended is set already
     }
@@ -83,8 +82,7 @@ void walk(const BoxRay* rays, std::size_t count, std::uint64_t* bits) noexcept {
 void walk(const BoxRay* rays, std::size_t count, std::uint64_t* bits) noexcept {
   for (const BoxRay* ray = rays; ray != rays + count; ++ray) {
     double next[3] = {ray->next[0], ray->next[1], ray->next[2]};
-    std::int64_t left[3] = {ray->left[0], ray->left[1], ray->left[2]};
-    std::int64_t bit = ray->bit, way = ray->way;
+    std::int64_t bit = ray->bit, left = ray->left;
     bool ended = false;
     while (!ended) {
       set(bits, bit);
@@ -95,13 +93,11 @@ void walk(const BoxRay* rays, std::size_t count, std::uint64_t* bits) noexcept {
         const std::int64_t mask = -std::int64_t{across[i]};
         next[i] += across[i] ? ray->apart[i] : 0.0;
         bit += mask & ray->bit_step[i];
-        way -= mask & ray->way_step[i];
-        left[i] += mask;
-        ended |= left[i] == 0;
+        left -= mask & ray->left_step[i];
       }
       double nearest = next[0] < next[1] ? next[0] : next[1];
       nearest = nearest < next[2] ? nearest : next[2];
-      ended |= (way == 0) | (nearest > ray->length);
+      ended = ((left & left_box) != 0) | (bit == ray->end_bit) | (nearest > ray->length);
     }
   }
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "hamelin/scene/boxes.hpp"
@@ -23,6 +24,9 @@ class VoxelGrid {
   template <class Changed>
   void set(const VoxelBox& voxels, bool occupied, const Changed& changed);
   void set(const VoxelBox& voxels);
+  void clear(const VoxelBox& voxels);
+  /// Whether any voxel of a box is occupied.
+  [[nodiscard]] bool any(const VoxelBox& voxels) const;
   /// Sets all voxels that are occupied in another grid whose box is within this one.
   void copy(const VoxelGrid& other);
   /// The smallest box that holds all occupied voxels; an empty one if there is none.
@@ -32,6 +36,10 @@ class VoxelGrid {
   [[nodiscard]] std::size_t bytes() const noexcept { return bits_.size() * sizeof(std::uint64_t); }
 
  private:
+  /// The first and the last word of the rows of a box that is within the grid, and the bits of one
+  /// of them.
+  [[nodiscard]] std::pair<std::int32_t, std::int32_t> words_of(const VoxelBox& inside) const;
+  [[nodiscard]] std::uint64_t bits_of(const VoxelBox& inside, std::int32_t word) const;
   [[nodiscard]] std::size_t row(std::int32_t y, std::int32_t z) const noexcept {
     return static_cast<std::size_t>((z - box_.lo[2]) * (box_.hi[1] - box_.lo[1]) + y - box_.lo[1]) *
            static_cast<std::size_t>(words_);

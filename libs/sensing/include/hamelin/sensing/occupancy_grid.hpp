@@ -81,6 +81,7 @@ class OccupancyGrid {
   [[nodiscard]] bool contains(const Voxel& voxel) const noexcept;
   [[nodiscard]] std::int64_t bit_of(const Voxel& voxel) const noexcept;
   void free_along(const Eigen::Vector3f& origin, const Eigen::Vector3f& end);
+  void walk_rays();
   void mark(const Eigen::Ref<const Eigen::Matrix3Xf>& points, const Eigen::Vector3f& origin,
             double range_m);
   void apply();

@@ -11,16 +11,20 @@ struct BoxRay {
   double length;
   std::int64_t bit;  ///< of the first voxel
   std::array<std::int64_t, 3> bit_step;
-  std::int64_t way;  ///< to the voxel of the end: packed(end − voxel)
-  std::array<std::int64_t, 3> way_step;
-  std::array<std::int64_t, 3> left;  ///< steps until it leaves the box; positive
+  std::int64_t end_bit;  ///< of the voxel of the end; −1 if that is outside of the box
+  /// Steps until it leaves the box, one less along each axis: packed(…), see left_box.
+  std::int64_t left;
+  std::array<std::int64_t, 3> left_step;
 
-  /// One number for differences of less than 2¹⁹ voxels along each axis.
+  /// One number for three below 2²⁰.
   [[nodiscard]] static constexpr std::int64_t packed(std::int64_t x, std::int64_t y,
                                                      std::int64_t z) noexcept {
-    return x + (y * 1048576) + (z * 1048576 * 1048576);
+    return x + (y << 21) + (z << 42);
   }
 };
+
+/// Bits of BoxRay::left that are set when one of the three has become −1 by steps of one.
+inline constexpr std::int64_t left_box = BoxRay::packed(1 << 20, 1 << 20, 1 << 20);
 
 struct WalkKernels {
   /// Sets the bits of all voxels that rays pass before that of their end and within the box.
