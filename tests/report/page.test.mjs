@@ -85,7 +85,7 @@ async function showsItsData(page, { json, worldOf }) {
   const found = await counts(page);
   assert.equal(found.runs, json.runs.length);
   assert.deepEqual(found.frames, json.runs.map((run) => run.frames.t.n));
-  assert.deepEqual(found.voxels, json.runs.map((run) => worldOf(run).map?.level.n ?? 0));
+  assert.deepEqual(found.voxels, json.runs.map((run) => (run.seen?.alone ? 0 : worldOf(run).map?.level.n ?? 0) + (run.seen?.since.n ?? 0)));
 }
 
 async function tipsAreRight(page, { json, unpack, worldOf }) {
@@ -114,10 +114,25 @@ async function nearCellsAreRight(page, { json, unpack, worldOf, middle }) {
   const shown = (await counts(page)).voxelsShown;
   for (const [i, run] of json.runs.entries()) {
     const world = worldOf(run);
-    if (!world.map || !world.robot.spheres.length) continue;
+    if (!world.map || !world.robot.spheres.length || run.seen) continue;
     assert.deepEqual([world.map.position_m, world.map.quaternion_wxyz], [[0, 0, 0], [1, 0, 0, 0]], 'this test assumes that the map has the pose of the world');
     const { least, most } = cellsWithin(world, unpack, jointsAt(run, unpack, world.robot.joints.length, middle), distance);
     assert.ok(shown[i] >= least && shown[i] <= most, `run ${i}: ${shown[i]} cells, expected ${least} to ${most}`);
+  }
+}
+
+async function seenCellsAppear(page, { json, unpack, middle }) {
+  for (const t of [0, middle, 1e9]) {
+    await setTime(page, t);
+    const shown = (await counts(page)).voxelsShown;
+    const end = Math.max(...json.runs.map((run) => unpack(run.frames.t).at(-1)));
+    json.runs.forEach((run, i) => {
+      if (!run.seen?.alone) return;
+      const since = unpack(run.seen.since);
+      const there = since.filter((s) => s <= Math.min(t, end)).length;
+      assert.equal(shown[i], there, `run ${i}, ${t} s`);
+      if (t === middle) assert.ok(there > 0 && there <= since.length);
+    });
   }
 }
 
@@ -175,6 +190,7 @@ for (const file of [...given, everything, planar].filter(Boolean)) {
     await t.test('panels, comparison, event ticks', () => panelsAndTablesAreComplete(page, data));
     await t.test('the tip is at the position given by the matrix exponential, at frames and between', () => tipsAreRight(page, data));
     if (data.has.map) await t.test('"only near the arm" shows exactly the cells within the distance', () => nearCellsAreRight(page, data));
+    if (data.json.runs.some((run) => run.seen)) await t.test('what sensors see appears when they see it', () => seenCellsAppear(page, data));
     assert.deepEqual(observed.errors, []);
     assert.deepEqual(observed.requests, [pathToFileURL(path.resolve(file)).href.slice(0, 200)]);
     await page.close();

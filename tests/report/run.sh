@@ -32,6 +32,8 @@ done
 run data/scenes/shelf_person.json hybrid person.jsonl.zst --every 4
 run data/scenes/shelf_carry.json hybrid carry.jsonl.zst --every 4
 "$program" report "$work/carry.jsonl.zst" -o "$work/carry.html"
+run data/scenes/shelf_seen.json hybrid seen.jsonl.zst --set /duration_s=1 --every 4
+"$program" report "$work/seen.jsonl.zst" -o "$work/seen.html"
 run data/scenes/follow_shelf.json hybrid follow.jsonl.zst --set /duration_s=10 --every 4
 "$program" report "$work/follow.jsonl.zst" -o "$work/follow.html"
 "$program" report "$work/person.jsonl.zst" -o "$work/person.html"
@@ -55,4 +57,4 @@ export NODE_MODULES=$modules HAMELIN_TEMPLATES=$templates
 HAMELIN_SWEEP_PAGES="$work/tries.html:$work/gains.html:$work/study.html" HAMELIN_ACCURACY_PAGE="$work/accuracy.html" node --test "$here/documents.test.mjs"
 # Real runs. page.test.mjs adds made-up runs with what no scene in data/ has: obstacles that appear
 # later, a prismatic joint.
-HAMELIN_PAGES="$work/shelf.html:$work/paper_52.html:$work/person.html:$work/carry.html:$work/follow.html" HAMELIN_TEMPLATE=$templates/page.html node --test "$here/page.test.mjs"
+HAMELIN_PAGES="$work/shelf.html:$work/paper_52.html:$work/person.html:$work/carry.html:$work/follow.html:$work/seen.html" HAMELIN_TEMPLATE=$templates/page.html node --test "$here/page.test.mjs"

@@ -97,6 +97,8 @@ TEST_CASE("the map of many frames equals OctoMap's own insertion, voxel by voxel
           "[control][points][reference]") {
   for (const auto unknown : {scene::UnknownPolicy::free, scene::UnknownPolicy::block}) {
     Room room(unknown);
+    const bool close_gaps = GENERATE(false, true);
+    room.scene.map->points.close_gaps = close_gaps;
     // an arm that is far away, so that all points count
     room.scene.map->points.margin_m = 0.0;
     room.make();
@@ -127,7 +129,7 @@ TEST_CASE("the map of many frames equals OctoMap's own insertion, voxel by voxel
     const auto& map = room.environment().map_field();
     const auto& space = room.environment().unknown_field();
     scene::BoxHit hit;
-    int different = 0, occupied = 0, known = 0;
+    int different = 0, occupied = 0, known = 0, closed = 0;
     for (int x = 30; x < 60; ++x)
       for (int y = -30; y < 30; ++y)
         for (int z = -5; z < 35; ++z) {
@@ -138,12 +140,17 @@ TEST_CASE("the map of many frames equals OctoMap's own insertion, voxel by voxel
           occupied += full ? 1 : 0;
           known += node != nullptr ? 1 : 0;
           different += map.nearest(p, 0.0, hit) != full ? 1 : 0;
-          if (unknown == scene::UnknownPolicy::block)
-            different += space.nearest(p, 0.0, hit) != (node == nullptr) ? 1 : 0;
+          if (unknown != scene::UnknownPolicy::block) continue;
+          const bool blocks = space.nearest(p, 0.0, hit);
+          const bool gap = close_gaps && node == nullptr && !blocks;
+          closed += gap ? 1 : 0;
+          different += !gap && blocks != (node == nullptr) ? 1 : 0;
         }
     CHECK(occupied > 1000);
     CHECK(known > 10000);
     CHECK(different == 0);
+    CHECK((closed > 0) == (close_gaps && unknown == scene::UnknownPolicy::block));
+    CHECK(20 * closed < known);
   }
 }
 

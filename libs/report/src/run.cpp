@@ -243,6 +243,11 @@ void Run::add_event(const Json& line, const log::LogReader& reader) {
   const VectorXd q = joint_vector(line, "q", world_.model.dof(), reader);
   if (const auto name = name_of("attached")) loads_.attach(*name, t);
   if (const auto name = name_of("detached")) loads_.detach(*name, t, q);
+  if (const Json* seen = find(line, "seen")) {
+    if (!seen_.add(*seen, t))
+      throw line_error(reader, "seen: expected runs of voxels, four integers each");
+    return;  // as many as frames: the map shows them
+  }
   if (events_.size() < events_max)
     events_.push_back({{"t", std::isnan(t) ? Json(nullptr) : Json(t)}, {"text", *text}});
   else
@@ -437,7 +442,6 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
   run["result"] = std::move(result_);
   run["config"] = std::move(config_);
   run["provenance"] = std::move(provenance_);
-  run["notes"] = notes_;
   Frames columns(world_);
   for (const Frame& frame : frames) columns.add(frame);
   run["frames"] = columns.json(container, recorded_.scene.step_s);
@@ -445,8 +449,10 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
   run["stops"] = stops_.json();
   run["acts"] = acts_.json();
   run["loads"] = loads_.take();
+  run["seen"] = seen_.json(container, recorded_.scene.map && !recorded_.scene.map->known, notes_);
   run["drawings"] = drawings_.json(container);
   run["plots"] = plots_json(container);
+  run["notes"] = notes_;
   return run;
 }
 

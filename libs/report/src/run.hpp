@@ -15,6 +15,7 @@
 #include "hamelin/report/report.hpp"
 #include "hamelin/simulation/replay.hpp"
 #include "loads.hpp"
+#include "seen.hpp"
 #include "stops.hpp"
 #include "world.hpp"
 
@@ -64,6 +65,7 @@ class Run {
   Stops stops_;
   Acts acts_;
   Loads loads_;
+  Seen seen_;
   Drawings drawings_;
   std::optional<std::size_t> evasion_;  ///< number of the series that tells the acts
   Json events_ = Json::array(), result_ = nullptr, config_, provenance_;

@@ -698,6 +698,54 @@ TEST_CASE("what the arm carries moves with the tip between its events", "[report
   CHECK((link * Vector3d(vector_of(balls[0]["center_m"])) - tip * capsule.from_m).norm() < 1e-12);
 }
 
+TEST_CASE("the map of an arm that sees is what it has seen so far", "[report]") {
+  const auto folder = test::scratch("seen");
+  const auto log = folder / "run.jsonl";
+  scene::Scene scene = scene::read_scene(test::checkout("data/scenes/shelf_seen.json"));
+  scene.duration_s = 0.5;
+  for (auto& sensor : scene.sensors) {
+    sensor.width = 64;
+    sensor.height = 48;
+  }
+  (void)test::log_run(scene, log);
+  std::size_t voxels = 0, frames = 0;
+  double last_s = 0.0;
+  for (const Json& line : log::read_log(log).lines) {
+    if (!line.contains("seen")) continue;
+    ++frames;
+    last_s = line["time_s"];
+    for (const Json& run : line["seen"]) voxels += run[3].get<std::size_t>();
+  }
+  REQUIRE(frames >= 4);
+  const Decoded page(report::make_data({log}).bytes);
+  const Json& run = page.head["runs"][0];
+  CHECK(run["events"].size() < frames);
+  CHECK(run["seen"]["alone"] == true);
+  const auto since = page(run["seen"]["since"]), lo = page(run["seen"]["lo"]);
+  REQUIRE(since.size() == voxels);
+  REQUIRE(lo.size() == 3 * voxels);
+  CHECK(std::is_sorted(since.begin(), since.end()));
+  CHECK(since.back() == last_s);
+  // noise of 2 mm, voxels of 1 cm
+  scene.map->known = true;
+  const auto environment = scene::make_environment(scene, control::load_model(scene), 0.2);
+  std::size_t off = 0;
+  for (std::size_t i = 0; i < voxels; ++i) {
+    const Vector3d p = 0.01 * (Vector3d(lo[3 * i], lo[3 * i + 1], lo[3 * i + 2]).array() + 0.5);
+    scene::BoxHit hit;
+    off += environment.map_field().nearest(p, 0.02, hit) ? 0 : 1;
+  }
+  CHECK(off == 0);
+
+  std::string text = read_file(log);
+  const std::size_t found = text.find(R"("seen":[[)");
+  REQUIRE(found != std::string::npos);
+  text.insert(found + 9, "99999,0,0,1],[");
+  write_file_atomically(folder / "far.jsonl", text);
+  CHECK_THROWS_WITH((void)report::make_data({folder / "far.jsonl"}),
+                    Catch::Contains("seen: expected runs of voxels"));
+}
+
 TEST_CASE("the lines that a planner has drawn are those of the log", "[report]") {
   const auto folder = test::scratch("drawings");
   const auto log = folder / "run.jsonl";

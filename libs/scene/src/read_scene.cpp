@@ -527,6 +527,7 @@ PointsSpec read_points_spec(const Reader& in) {
                             {"most", &points.most}})
     *value = in.get(key, *value);
   points.movers = in.get("movers", points.movers);
+  points.close_gaps = in.get("close_gaps", points.close_gaps);
   if (points.least > points.most)
     in.fail("least", fmt::format("{} is above most, {}", points.least, points.most));
   return points;

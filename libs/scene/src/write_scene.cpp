@@ -120,6 +120,7 @@ Json map_json(const MapSpec& map) {
                    {"time_error_s", points.time_error_s},
                    {"age_max_s", points.age_max_s},
                    {"movers", points.movers},
+                   {"close_gaps", points.close_gaps},
                    {"hit", points.hit},
                    {"miss", points.miss},
                    {"least", points.least},

@@ -248,6 +248,53 @@ std::span<const OccupancyGrid::Row> OccupancyGrid::insert(
   return rows_;
 }
 
+std::uint64_t OccupancyGrid::free_in(std::int64_t word, std::int64_t y, std::int64_t z) const {
+  if (word < 0 || word >= words_ || y < 0 || y >= box_.hi[1] - box_.lo[1] || z < 0 ||
+      z >= box_.hi[2] - box_.lo[2])
+    return 0;
+  const auto at = static_cast<std::size_t>((y * stride_[1] + z * stride_[2]) / 64 + word);
+  return known_.words[at] & ~occupied_.words[at];
+}
+
+// docs/theory.md (20.6)
+std::uint64_t OccupancyGrid::gaps_in(std::int64_t word, std::int64_t y, std::int64_t z) const {
+  const std::uint64_t here = free_in(word, y, z);
+  const std::uint64_t x =
+      (here << 1U | free_in(word - 1, y, z) >> 63U) & (here >> 1U | free_in(word + 1, y, z) << 63U);
+  const std::uint64_t along_y = free_in(word, y - 1, z) & free_in(word, y + 1, z),
+                      along_z = free_in(word, y, z - 1) & free_in(word, y, z + 1);
+  const auto at = static_cast<std::size_t>((y * stride_[1] + z * stride_[2]) / 64 + word);
+  return ~known_.words[at] & ((x & along_y) | (x & along_z) | (along_y & along_z));
+}
+
+std::span<const OccupancyGrid::Row> OccupancyGrid::gaps() {
+  // words with a neighbour of what was freed, each once
+  std::vector<std::size_t> near;
+  const std::array<std::int64_t, 3> step{1, stride_[1] / 64, stride_[2] / 64};
+  const std::array<std::int64_t, 3> count{words_, box_.hi[1] - box_.lo[1], box_.hi[2] - box_.lo[2]};
+  for (const Row& row : rows_) {
+    if ((row.freed & row.learned) == 0) continue;
+    const std::array<std::int64_t, 3> at{(row.first[0] - box_.lo[0]) / 64,
+                                         row.first[1] - box_.lo[1], row.first[2] - box_.lo[2]};
+    const std::int64_t word = at[0] + at[1] * step[1] + at[2] * step[2];
+    near.push_back(static_cast<std::size_t>(word));
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (at[i] > 0) near.push_back(static_cast<std::size_t>(word - step[i]));
+      if (at[i] + 1 < count[i]) near.push_back(static_cast<std::size_t>(word + step[i]));
+    }
+  }
+  std::sort(near.begin(), near.end());
+  near.erase(std::unique(near.begin(), near.end()), near.end());
+  gaps_.clear();
+  for (const std::size_t word : near) {
+    const Voxel first = first_of(word);
+    const std::uint64_t gaps =
+        gaps_in((first[0] - box_.lo[0]) / 64, first[1] - box_.lo[1], first[2] - box_.lo[2]);
+    if (gaps != 0) gaps_.push_back({first, 0, gaps, gaps});
+  }
+  return gaps_;
+}
+
 float OccupancyGrid::value_of(std::size_t word, std::uint64_t bit) const noexcept {
   if ((known_.words[word] & bit) == 0) return 0.0F;
   return (occupied_.words[word] & bit) != 0 ? model_.most : model_.least;
@@ -285,6 +332,11 @@ void OccupancyGrid::set(const scene::VoxelBox& box, State state) {
         x += count;
       }
     }
+}
+
+OccupancyGrid::Voxel OccupancyGrid::voxel_of(const Eigen::Vector3d& p) const noexcept {
+  const double voxels_per_m = 1.0 / resolution_;
+  return {voxel_at(p[0], voxels_per_m), voxel_at(p[1], voxels_per_m), voxel_at(p[2], voxels_per_m)};
 }
 
 OccupancyGrid::State OccupancyGrid::state(const Voxel& voxel) const {

@@ -2,6 +2,8 @@
 
 #include <octomap/octomap.h>
 
+#include <algorithm>
+#include <bit>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <map>
@@ -126,6 +128,56 @@ TEST_CASE("what disappears is freed after as many frames as OctoMap needs", "[se
   CHECK(frames == 9);  // log-odds of 3.5 by 0.405 each
   CHECK(grid.insert(far, origin).empty());
   CHECK(grid.state({90, 0, 0}) == State::unknown);
+}
+
+TEST_CASE("voxels between those that rays pass are free", "[sensing][unit]") {
+  OccupancyGrid grid(0.01, box);
+  // along x, through the voxels with these y and z
+  const auto look = [&](float y, float z) {
+    const Eigen::Vector3f origin(-0.695F, y, z), point(0.755F, y, z);
+    (void)grid.insert(Eigen::Matrix3Xf(point), origin);
+    return grid.gaps();
+  };
+  // the voxel amid four lines, and one beside two of them
+  const OccupancyGrid::Voxel amid{62, 5, 5}, beside{62, 6, 6};
+  grid.set({{50, 4, 5}, {75, 5, 6}}, State::free);
+  grid.set({{50, 6, 5}, {75, 7, 6}}, State::free);
+  grid.set({{50, 5, 4}, {75, 6, 5}}, State::free);
+  grid.set({{50, 5, 6}, {75, 6, 7}}, State::free);
+  CHECK(grid.state(amid) == State::unknown);
+  CHECK(look(0.005F, 0.005F).empty());  // nothing next to it was learned
+  grid.set({{62, 6, 5}, {63, 7, 6}}, State::unknown);
+  const auto rows = look(0.065F, 0.055F);
+  std::vector<OccupancyGrid::Voxel> found;
+  for (const OccupancyGrid::Row& row : rows) {
+    CHECK(row.occupied == 0);
+    for (std::uint64_t left = row.freed; left != 0; left &= left - 1)
+      found.push_back({row.first[0] + std::countr_zero(left), row.first[1], row.first[2]});
+  }
+  const auto has = [&](const OccupancyGrid::Voxel& voxel) {
+    return std::find(found.begin(), found.end(), voxel) != found.end();
+  };
+  CHECK(has(amid));
+  CHECK_FALSE(has(beside));
+  CHECK(grid.state(amid) == State::unknown);
+}
+
+TEST_CASE("what rays leave unknown behind a wall stays so", "[sensing][unit]") {
+  OccupancyGrid grid(0.01, box);
+  const Eigen::Vector3f origin(-0.695F, 0.005F, 0.005F);
+  Eigen::Matrix3Xf wall(3, 41 * 41);
+  for (int i = 0; i < 41 * 41; ++i)
+    wall.col(i) << 0.305F, -0.2F + 0.01F * static_cast<float>(i % 41),
+        -0.1F + 0.005F * static_cast<float>(i / 41);
+  std::size_t behind = 0;
+  for (int k = 0; k < 5; ++k) {
+    (void)grid.insert(wall, origin);
+    for (const OccupancyGrid::Row& row : grid.gaps())
+      for (int i = 0; i < 64; ++i)
+        behind += (row.freed >> i & 1U) != 0 && row.first[0] + i >= 30 ? 1 : 0;
+  }
+  CHECK(behind == 0);
+  CHECK(grid.state({35, 0, 0}) == State::unknown);
 }
 
 TEST_CASE("grids and frames that make no sense are refused", "[sensing][unit]") {

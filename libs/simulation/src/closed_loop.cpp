@@ -94,10 +94,25 @@ void ClosedLoop::observe_node() {
   reveal_obstacles();
   change_map();
   if (sensors_)
-    sensors_->advance(plant_->node().time_s, judge_->view(), *controller_,
-                      [this](const std::string& line) { report_event(true, line); });
+    sensors_->advance(
+        plant_->node().time_s, judge_->view(), *controller_,
+        [this](const std::string& line) { report_event(true, line); },
+        [this](const std::string& camera, const std::vector<scene::VoxelBox>& runs) {
+          record_seen(camera, runs);
+        });
   recorder_->observe(judge_->view().clearance_m(), judge_->certified(), plant_->node().v,
                      scene_.step_s);
+}
+
+void ClosedLoop::record_seen(const std::string& camera, const std::vector<scene::VoxelBox>& runs) {
+  if (watch_->log == nullptr) return;
+  Json seen = Json::array();
+  for (const scene::VoxelBox& run : runs)
+    seen.push_back({run.lo[0], run.lo[1], run.lo[2], run.hi[0] - run.lo[0]});
+  recorder_->event(
+      plant_->node().time_s,
+      fmt::format("'{}' sees {} voxels for the first time", camera, scene::voxels_in(runs)),
+      {{"seen", std::move(seen)}});
 }
 
 void ClosedLoop::reveal_obstacles() {

@@ -49,6 +49,7 @@ class ClosedLoop {
   /// stayed clear, and changes of the map that are due.
   void observe_node();
   /// Shows the controller obstacles that come into sight.
+  void record_seen(const std::string& camera, const std::vector<scene::VoxelBox>& runs);
   void reveal_obstacles();
   void change_map();
 

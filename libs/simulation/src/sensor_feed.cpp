@@ -51,8 +51,25 @@ control::PointFrame SensorFeed::look(Camera& camera, double time_s, control::Wor
   return frame;
 }
 
-void SensorFeed::advance(double time_s, control::WorldView& truth, control::Controller& controller,
-                         const std::function<void(const std::string&)>& refused) {
+std::vector<scene::VoxelBox> SensorFeed::first_seen(const scene::MapChange& change) {
+  std::vector<scene::VoxelBox> out;
+  for (const scene::VoxelBox& run : change.occupied)
+    for (std::int32_t x = run.lo[0]; x < run.hi[0]; ++x) {
+      if (!seen_.insert({run.lo[2], run.lo[1], x}).second) continue;
+      const bool goes_on = x > run.lo[0] && !out.empty() && out.back().hi[0] == x &&
+                           out.back().lo[1] == run.lo[1] && out.back().lo[2] == run.lo[2];
+      if (goes_on)
+        ++out.back().hi[0];
+      else
+        out.push_back({{x, run.lo[1], run.lo[2]}, {x + 1, run.lo[1] + 1, run.lo[2] + 1}});
+    }
+  return out;
+}
+
+void SensorFeed::advance(
+    double time_s, control::WorldView& truth, control::Controller& controller,
+    const std::function<void(const std::string&)>& refused,
+    const std::function<void(const std::string&, const std::vector<scene::VoxelBox>&)>& seen) {
   for (; !pending_.empty() && pending_.front().due_s <= time_s + time_rounding_s;
        pending_.pop_front()) {
     const Pending& pending = pending_.front();
@@ -63,6 +80,7 @@ void SensorFeed::advance(double time_s, control::WorldView& truth, control::Cont
       figures_.on_arm += report.on_arm;
       figures_.occupied += report.occupied;
       figures_.cleared += report.cleared;
+      if (const auto fresh = first_seen(report.change); !fresh.empty()) seen(pending.camera, fresh);
     } catch (const Error& e) {
       ++figures_.refused;
       refused(pending.camera + ": " + e.what());

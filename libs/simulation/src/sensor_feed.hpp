@@ -1,6 +1,9 @@
 #pragma once
+#include <array>
+#include <cstdint>
 #include <deque>
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -22,8 +25,12 @@ class SensorFeed {
   /// Passes on the frames that are due, and takes those that are seen now.
   /// @param truth the world as it is, with the arm where it is
   /// @param refused receives one line of text for each frame that is refused
-  void advance(double time_s, control::WorldView& truth, control::Controller& controller,
-               const std::function<void(const std::string&)>& refused);
+  /// @param seen receives the name of a camera and, as runs along x, the voxels that it was the
+  ///        first to find occupied
+  void advance(
+      double time_s, control::WorldView& truth, control::Controller& controller,
+      const std::function<void(const std::string&)>& refused,
+      const std::function<void(const std::string&, const std::vector<scene::VoxelBox>&)>& seen);
   /// The map that is seen has changed.
   void change_map() noexcept { map_is_read_ = false; }
 
@@ -40,6 +47,8 @@ class SensorFeed {
     std::string camera;
     control::PointFrame frame;
   };
+  /// Runs of those voxels that were not in a change before.
+  [[nodiscard]] std::vector<scene::VoxelBox> first_seen(const scene::MapChange& change);
   [[nodiscard]] control::PointFrame look(Camera& camera, double time_s, control::WorldView& truth);
   void see_solids(double time_s, control::WorldView& truth);
 
@@ -49,7 +58,8 @@ class SensorFeed {
   bool map_is_read_ = false;
   std::vector<Camera> cameras_;
   std::vector<sensing::DepthRenderer::Solid> solids_;
-  std::deque<Pending> pending_;  ///< by the time when they are due
+  std::deque<Pending> pending_;                 ///< by the time when they are due
+  std::set<std::array<std::int32_t, 3>> seen_;  ///< voxels, z first
   log::Result::Sensors figures_;
 };
 

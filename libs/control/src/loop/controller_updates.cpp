@@ -388,6 +388,9 @@ void Controller::update_guidance() {
            guidance_->cause().empty() ? "" : ", without a motion: ", guidance_->cause());
   else
     append(line, "guide: {}", guidance_->cause());
+  // in a world that changes all the time, so does the search
+  if (line.view() == guide_line_.view()) return;
+  guide_line_ = line;
   options_.log(HAMELIN_LOG_INFO, line.view());
 }
 

@@ -29,6 +29,10 @@ void each_run(const OccupancyGrid::Row& row, std::uint64_t bits, const F& f) {
   }
 }
 
+sensing::SensorModel model_of(const scene::PointsSpec& points) {
+  return {points.hit, points.miss, points.least, points.most, 0.5};
+}
+
 scene::VoxelBox around(const OccupancyGrid::Voxel& voxel, std::int32_t reach) {
   scene::VoxelBox out{voxel, voxel};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -40,26 +44,19 @@ scene::VoxelBox around(const OccupancyGrid::Voxel& voxel, std::int32_t reach) {
 
 }  // namespace
 
-SensedMap::SensedMap(const scene::Environment& environment, const sensing::SensorModel& model)
+SensedMap::SensedMap(const scene::Environment& environment)
     : ball_(environment.map_ball()),
       unknown_matters_(environment.summary().unknown != scene::UnknownPolicy::free),
-      grid_(sensing::grid_of(environment, model)),
+      close_gaps_(unknown_matters_ && environment.map_spec()->points.close_gaps),
+      grid_(sensing::grid_of(environment, model_of(environment.map_spec()->points))),
       standing_(grid_.box()) {
   const scene::BoxField& boxes = environment.map_field().boxes();
   for (std::size_t i = 0; i < boxes.boxes().size(); ++i)
     if (boxes.alive(i)) standing_.set(scene::to_voxels(boxes.boxes()[i], grid_.resolution_m()));
 }
 
-SensedMap::Voxel SensedMap::voxel_of(const Eigen::Vector3d& p) const {
-  Voxel voxel;
-  for (std::size_t i = 0; i < 3; ++i)
-    voxel[i] = static_cast<std::int32_t>(
-        std::floor(p[static_cast<Eigen::Index>(i)] / grid_.resolution_m()));
-  return voxel;
-}
-
 bool SensedMap::occupied(const Eigen::Vector3d& p) const {
-  return grid_.state(voxel_of(p)) == State::occupied;
+  return grid_.state(grid_.voxel_of(p)) == State::occupied;
 }
 
 std::vector<std::uint8_t> SensedMap::loose(const Eigen::Ref<const Eigen::Matrix3Xf>& points,
@@ -68,7 +65,7 @@ std::vector<std::uint8_t> SensedMap::loose(const Eigen::Ref<const Eigen::Matrix3
   std::vector<std::uint8_t> out(static_cast<std::size_t>(points.cols()), 0);
   const auto near = static_cast<std::int32_t>(std::ceil(next_to_m / grid_.resolution_m()));
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    const Voxel at = voxel_of(points.col(i).cast<double>());
+    const Voxel at = grid_.voxel_of(points.col(i).cast<double>());
     if (standing_.any(around(at, near)) || grid_.state(at) == State::unknown) continue;
     out[static_cast<std::size_t>(i)] = 1;
   }
@@ -104,6 +101,8 @@ scene::MapChange SensedMap::insert(const Eigen::Ref<const Eigen::Matrix3Xf>& poi
     // what was unknown and is free now was no obstacle before, where unknown space is free
     add_runs(row, unknown_matters_ ? row.freed : row.freed & ~row.learned, change.free);
   }
+  if (close_gaps_)
+    for (const OccupancyGrid::Row& row : grid_.gaps()) add_runs(row, row.freed, change.free);
   return change;
 }
 

@@ -14,8 +14,8 @@ namespace hamelin::control {
 /// What is known of the voxels of an environment's map, which frames of points change.
 class SensedMap {
  public:
-  /// All that the map knows counts as seen before.
-  SensedMap(const scene::Environment& environment, const sensing::SensorModel& model);
+  /// All that the map, which there must be, knows counts as seen before.
+  explicit SensedMap(const scene::Environment& environment);
 
   /// Whether a point of the map's frame is in an occupied voxel.
   [[nodiscard]] bool occupied(const Eigen::Vector3d& p) const;
@@ -32,7 +32,6 @@ class SensedMap {
 
  private:
   using Voxel = sensing::OccupancyGrid::Voxel;
-  [[nodiscard]] Voxel voxel_of(const Eigen::Vector3d& p) const;
   void note_change(const sensing::OccupancyGrid::Row& row, double time_s);
   /// What became occupied long before stands now, if it is occupied.
   void age(double time_s);
@@ -40,7 +39,7 @@ class SensedMap {
                 std::vector<scene::VoxelBox>& out) const;
 
   scene::Ball ball_;  ///< beyond which the map does not matter
-  bool unknown_matters_;
+  bool unknown_matters_, close_gaps_;
   sensing::OccupancyGrid grid_;
   scene::VoxelGrid standing_;  ///< occupied, and so for long
   /// Runs of voxels that were free and became occupied, and when.

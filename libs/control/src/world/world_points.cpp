@@ -50,7 +50,8 @@ geometry::SE3 mount_of(scene::Mount mount, const model::Model& model,
   refuse("the sensor's mount is unknown, expected the world, the base or the tip");
 }
 
-// Moves points that are not on the arm, in none of its postures, to the front: docs/theory.md (20.3).
+// Moves points that are not on the arm, in none of its postures, to the front: docs/theory.md
+// (20.3).
 Eigen::Index remove_arms(const model::Model& model, const std::vector<Eigen::VectorXd>& postures,
                          double margin_m, dynamics::Workspace& ws, Matrix3Xf& points) {
   Eigen::Index kept = points.cols();
@@ -121,11 +122,15 @@ void World::note_load(std::uint64_t load, model::Model model) {
 }
 
 World::SeenArm World::arm_seen_by(const PointFrame& frame, const scene::PointsSpec& spec) const {
+  // the world outlives the frame
+  const auto unloaded = [&] {
+    return std::shared_ptr<const model::Model>(std::shared_ptr<void>(), &model_);
+  };
   const auto newest = postures_->newest();
   // before the first tick the arm is at the start
   if (!newest) {
     const bool given = scene_.start_q.size() > 0;
-    return {std::make_shared<const model::Model>(model_),
+    return {unloaded(),
             {given ? scene_.start_q : Eigen::VectorXd(Eigen::VectorXd::Zero(model_.dof()))}};
   }
   const double age_s = newest->time_s - frame.time_s;
@@ -145,7 +150,7 @@ World::SeenArm World::arm_seen_by(const PointFrame& frame, const scene::PointsSp
     if (load != loads_.end())
       seen.model = load->second;
     else if (at_time->load == 0)
-      seen.model = std::make_shared<const model::Model>(model_);
+      seen.model = unloaded();
     else
       refuse(fmt::format("seen at {} s, expected a later time: what the arm carried then is gone",
                          frame.time_s));
@@ -192,10 +197,7 @@ FrameReport World::insert_points(const PointFrame& frame) {
         "there is no map, expected one, if only {\"resolution_m\": 0.01}, where nothing is known");
   SeenPoints seen = seen_points(frame, environment);
   FrameReport& report = seen.report;
-  if (!sensed_)
-    sensed_ = std::make_unique<SensedMap>(
-        environment, sensing::SensorModel{map->points.hit, map->points.miss, map->points.least,
-                                          map->points.most, 0.5});
+  if (!sensed_) sensed_ = std::make_unique<SensedMap>(environment);
   const geometry::SE3 map_from_world = environment.map_pose().inverse();
   const Eigen::Vector3d origin = map_from_world * seen.sensor.p();
   if (sensed_->occupied(origin))
@@ -213,11 +215,11 @@ FrameReport World::insert_points(const PointFrame& frame) {
   report.movers = moving.movers.size();
   report.points = static_cast<std::size_t>(points.cols());
   report.snapshot = latest()->number;
-  const scene::MapChange change = sensed_->insert(points, origin, frame.range_m, frame.time_s);
-  report.occupied = scene::voxels_in(change.occupied);
-  report.cleared = scene::voxels_in(change.free);
+  report.change = sensed_->insert(points, origin, frame.range_m, frame.time_s);
+  report.occupied = scene::voxels_in(report.change.occupied);
+  report.cleared = scene::voxels_in(report.change.free);
   if (report.occupied + report.cleared > 0)
-    report.snapshot = publish_map(environment.with_change(change));
+    report.snapshot = publish_map(environment.with_change(report.change));
   if (!moving.movers.empty() || !moving.gone.empty())
     report.snapshot = movers_->tell(frame, moving, *this);
   return report;

@@ -89,6 +89,7 @@ function prepare(report) {
     run.stops ??= [];
     run.acts ??= [];
     run.loads ??= [];
+    run.seen ??= null;
     run.drawings ??= null;
     run.plots ??= [];
     run.notes ??= [];

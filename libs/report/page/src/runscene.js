@@ -9,6 +9,21 @@ import { Obstacles, Paths, Predictions } from './obstacles.js';
 import { StopLine } from './stops.js';
 import { Voxels } from './voxels.js';
 
+/** The map of a run: as it is, or as far as its sensors have seen it. */
+function mapOf({ map }, { seen }) {
+  if (!map) return null;
+  if (!seen) return map.level.length ? new Voxels(map) : null;
+  const { alone, lo, since } = seen;
+  const own = alone ? 0 : map.level.length;
+  const joined = (Type, before, after) => Type.from([...before, ...after]);
+  return new Voxels({
+    ...map,
+    lo: joined(Int16Array, map.lo.subarray(0, 3 * own), lo),
+    level: joined(Uint8Array, map.level.subarray(0, own), new Uint8Array(since.length)),
+    since: joined(Float64Array, new Float64Array(own), since),
+  });
+}
+
 export class RunScene {
   constructor(replay, floor) {
     const { world, frames } = replay;
@@ -21,7 +36,7 @@ export class RunScene {
     this.sun.position.set(0.6, -1, 1.6);
     this.scene.add(this.hemisphere, this.sun);
 
-    this.voxels = world.map && world.map.level.length ? new Voxels(world.map) : null;
+    this.voxels = mapOf(world, replay.run);
     this.arm = new Arm(world.robot, reach);
     this.spheres = new Spheres(world.robot, frames, Math.min(...this.arm.radii) > Math.max(0, ...world.robot.spheres.map((s) => s.radius_m)));
     this.contacts = new Contacts(frames, reach);
@@ -132,6 +147,7 @@ export class RunScene {
       pose[3], pose[4], pose[5], tip[1],
       pose[6], pose[7], pose[8], tip[2], 0, 0, 0, 1);
     if (!this.voxels) return;
+    this.voxels.showUntil(t);
     if (settings.near === null) this.voxels.showAll();
     else this.voxels.showNear(this.probeBalls(), settings.near);
   }

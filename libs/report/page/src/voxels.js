@@ -75,13 +75,16 @@ void main() {
   gl_FragColor = vec4(1.0);
 }`;
 
-/** For each cell, one bit for each face that no cell of the same or a larger size covers. */
-function exposedFaces(lo, level) {
+/**
+ * For each cell, one bit for each face that no cell of the same or a larger size covers that is
+ * there at least as long.
+ */
+function exposedFaces(lo, level, since) {
   const levels = [...new Set(level)].sort((a, b) => a - b);
   // keys are below 2^51 and therefore exact
   const key = (x, y, z) => ((x + 65536) * 131072 + (y + 65536)) * 131072 + (z + 65536);
-  const tables = new Map(levels.map((l) => [l, new Set()]));
-  for (let i = 0; i < level.length; ++i) tables.get(level[i]).add(key(lo[3 * i], lo[3 * i + 1], lo[3 * i + 2]));
+  const tables = new Map(levels.map((l) => [l, new Map()]));
+  for (let i = 0; i < level.length; ++i) tables.get(level[i]).set(key(lo[3 * i], lo[3 * i + 1], lo[3 * i + 2]), since?.[i] ?? 0);
   const bits = new Uint8Array(level.length);
   const at = [0, 0, 0];
   for (let i = 0; i < level.length; ++i) {
@@ -92,7 +95,7 @@ function exposedFaces(lo, level) {
         if (l < level[i]) return false;
         const size = 2 ** l;
         const [x, y, z] = at.map((c) => Math.floor(c / size) * size);
-        return tables.get(l).has(key(x, y, z));
+        return tables.get(l).get(key(x, y, z)) <= (since?.[i] ?? 0);
       });
       if (!covered) bits[i] |= 1 << face;
     }
@@ -101,6 +104,7 @@ function exposedFaces(lo, level) {
 }
 
 export class Voxels {
+  /** @param map its cells, in the order of `since` [s], the time from which each is there, if it has that */
   constructor(map) {
     const count = map.level.length;
     this.total = count;
@@ -121,7 +125,9 @@ export class Voxels {
       }
     }
     this.level = map.level;
-    this.exposed = exposedFaces(map.lo, map.level);
+    this.since = map.since ?? null;
+    this.time = Infinity;
+    this.exposed = exposedFaces(map.lo, map.level, map.since);
     this.texture = this.textureFor(1);
     const p = this.pose;
     this.uniforms = {
@@ -188,8 +194,33 @@ export class Voxels {
     this.showsAll = true;
     this.begin();
     // In a cut map the faces between cells are visible.
-    for (let i = 0; i < this.total; ++i) this.addCell(i, this.cut ? 63 : this.exposed[i]);
+    this.facesBefore = new Uint32Array(this.total + 1);
+    for (let i = 0; i < this.total; ++i) {
+      this.addCell(i, this.cut ? 63 : this.exposed[i]);
+      this.facesBefore[i + 1] = this.faces;
+    }
     this.publish();
+    this.showUntil(this.time);
+  }
+
+  /** How many cells are there at a time. */
+  countAt(time) {
+    if (!this.since) return this.total;
+    let [lo, hi] = [0, this.total];
+    while (lo < hi) {
+      const middle = (lo + hi) >> 1;
+      if (this.since[middle] <= time) lo = middle + 1;
+      else hi = middle;
+    }
+    return lo;
+  }
+
+  /** Of all cells, shows those that are there at a time. */
+  showUntil(time) {
+    this.time = time;
+    if (!this.since || !this.showsAll) return;
+    this.shown = this.countAt(time);
+    this.count(this.facesBefore[this.shown]);
   }
 
   /**
@@ -214,7 +245,8 @@ export class Voxels {
     // Neighbours in the list are neighbours in space: the ball that is near to one cell is tried
     // first for the next cell.
     let last = 0;
-    for (let i = 0; i < 4 * this.total; i += 4) {
+    const there = this.countAt(this.time);
+    for (let i = 0; i < 4 * there; i += 4) {
       const x = cells[i];
       const y = cells[i + 1];
       const z = cells[i + 2];
@@ -283,8 +315,12 @@ export class Voxels {
   }
 
   publish() {
-    this.uniforms.uCount.value = this.faces;
-    this.geometry.instanceCount = Math.ceil(this.faces / BLOCK);
+    this.count(this.faces);
     this.texture.needsUpdate = true;
+  }
+
+  count(faces) {
+    this.uniforms.uCount.value = faces;
+    this.geometry.instanceCount = Math.ceil(faces / BLOCK);
   }
 }

@@ -371,6 +371,7 @@ class Controller {
   PlannerGoal goal_{};
   std::unique_ptr<Guidance> guidance_;  ///< null without a guide
   std::uint64_t guidance_number_ = 0, listed_number_ = 0;
+  LineBuffer guide_line_;  ///< that was logged last
   GoalTracker goals_;
   bool usable_ = false;   ///< whether the measurement of this tick can be used
   int unusable_ = 0;      ///< so many in a row cannot be used

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "hamelin/geometry/se3.hpp"
+#include "hamelin/scene/map_change.hpp"
 #include "hamelin/scene/sensors.hpp"
 
 namespace hamelin::control {
@@ -31,6 +32,7 @@ struct FrameReport {
   std::size_t on_obstacles = 0;           ///< left out: on obstacles that the world knows
   std::size_t movers = 0;                 ///< bodies that move, which it sees
   std::size_t occupied = 0, cleared = 0;  ///< voxels of the map
+  scene::MapChange change;                ///< these voxels
 };
 
 /// @throws Error invalid, "points: …", for no point, more than points_max, numbers that are not

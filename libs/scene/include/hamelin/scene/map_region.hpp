@@ -29,6 +29,8 @@ struct PointsSpec {
   double age_max_s = 0.5;      ///< frames that come later after they were seen are refused
   /// Whether bodies that move are followed, and become obstacles instead of voxels.
   bool movers = true;
+  /// Whether single unknown voxels between free ones count as free.
+  bool close_gaps = true;
   /// That a voxel is occupied, as probabilities: by one point, by one ray that passes it, and by
   /// all together at least and at most. By these, one point occupies, and three rays free.
   double hit = 0.7, miss = 0.4, least = 0.4, most = 0.75;

@@ -53,10 +53,18 @@ class OccupancyGrid {
                               const Eigen::Vector3f& origin,
                               double range_m = std::numeric_limits<double>::infinity());
 
+  /// Unknown voxels next to those that the last insert() has freed, of which both neighbours along
+  /// two axes are free: rays pass on both sides of such a voxel, and only by chance none through
+  /// it, docs/theory.md (20.6). They stay unknown, as OctoMap leaves them.
+  /// @return the rows in which there are some, as `freed`; valid until the next call
+  std::span<const Row> gaps();
+
   /// Makes the part of a box that is within box() as well known as all measurements together can
   /// make it, or unknown.
   void set(const scene::VoxelBox& box, State state);
 
+  /// The voxel of a point of the map's frame [m].
+  [[nodiscard]] Voxel voxel_of(const Eigen::Vector3d& p) const noexcept;
   [[nodiscard]] State state(const Voxel& voxel) const;
   /// log(p/(1 − p)) for the probability p that it is occupied; NaN if nothing is known of it.
   [[nodiscard]] float log_odds(const Voxel& voxel) const;
@@ -85,6 +93,10 @@ class OccupancyGrid {
   void mark(const Eigen::Ref<const Eigen::Matrix3Xf>& points, const Eigen::Vector3f& origin,
             double range_m);
   void apply();
+  /// Of a row of words, by its place along y and z in the box: its voxels that are free; and those
+  /// of one word that are unknown between free ones.
+  [[nodiscard]] std::uint64_t free_in(std::int64_t word, std::int64_t y, std::int64_t z) const;
+  [[nodiscard]] std::uint64_t gaps_in(std::int64_t word, std::int64_t y, std::int64_t z) const;
   /// Changes the log-odds of a row's voxels. @return those that are occupied now
   std::uint64_t update(std::size_t word, std::uint64_t free, std::uint64_t occupied);
   /// The log-odds of a voxel that no frame has told about.
@@ -105,7 +117,7 @@ class OccupancyGrid {
   Bits passed_, hit_;              ///< by the rays of the frame
   std::unique_ptr<EndPoints> ends_;
   std::vector<kernel::BoxRay> rays_;
-  std::vector<Row> rows_;
+  std::vector<Row> rows_, gaps_;
 };
 
 }  // namespace hamelin::sensing
