@@ -48,8 +48,9 @@ class ClosedLoop {
   /// Observes the node that the last step reached: velocity, surroundings, proof that the step
   /// stayed clear, and changes of the map that are due.
   void observe_node();
-  /// Shows the controller obstacles that come into sight.
+  /// Logs the voxels that a camera was the first to find occupied, as runs along x.
   void record_seen(const std::string& camera, const std::vector<scene::VoxelBox>& runs);
+  /// Shows the controller obstacles that come into sight.
   void reveal_obstacles();
   void change_map();
 
