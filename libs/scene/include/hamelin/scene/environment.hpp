@@ -184,9 +184,9 @@ class Environment {
   void prepare() const;
 
   /// Distances from the map, and from unknown space that blocks, at the corners of its voxels, in
-  /// the map's frame. Computed at the first call, and from then on updated with each change of the
-  /// map. Null if it would need more than DistanceField::bytes_max. Environments that share the map
-  /// share it.
+  /// the map's frame. Computed at the first call, and again at the first one after a change of many
+  /// boxes; smaller changes update it. Null if it would need more than DistanceField::bytes_max.
+  /// Environments that share the map share it.
   [[nodiscard]] std::shared_ptr<const DistanceField> distance_field() const;
   /// Computes now what the first call of distance_field() would compute.
   void prepare_field() const { (void)distance_field(); }
