@@ -226,6 +226,9 @@ Json to_json(const Result& r) {
                               {"time_s", r.trajectory->time_s},
                               {"error_rms", r.trajectory->error_rms},
                               {"error_max", r.trajectory->error_max}};
+  for (const auto& allowed : r.may_touch)
+    document["may_touch"].push_back(
+        {{"goal", allowed.goal}, {"what", allowed.what}, {"clearance_m", allowed.clearance_m}});
   if (r.mover_contact) document["mover_contact"] = contact_json(*r.mover_contact);
   if (r.plant)
     document["plant"] = {{"type", r.plant->type},

@@ -98,7 +98,7 @@ class MujocoPlant final : public simulation::Plant {
   [[nodiscard]] Contacts contacts() const override {
     Contacts found;
     for (int i = 0; i < data_->ncon; ++i) {
-      if (data_->contact[i].dist > 0.0) continue;
+      if (data_->contact[i].dist > 0.0 || is_allowed(data_->contact[i])) continue;
       ++found.count;
       found.deepest_m = std::min(found.deepest_m, data_->contact[i].dist);
     }
@@ -108,7 +108,8 @@ class MujocoPlant final : public simulation::Plant {
   [[nodiscard]] std::string describe_contact() const override {
     const mjContact* deepest = nullptr;
     for (int i = 0; i < data_->ncon; ++i)
-      if (deepest == nullptr || data_->contact[i].dist < deepest->dist)
+      if (!is_allowed(data_->contact[i]) &&
+          (deepest == nullptr || data_->contact[i].dist < deepest->dist))
         deepest = data_->contact + i;
     if (deepest == nullptr) return "counts no contact";
     const bool link_first = shape(deepest->geom1).kind == Kind::link;
@@ -118,7 +119,36 @@ class MujocoPlant final : public simulation::Plant {
                        describe_shape(link_first ? deepest->geom2 : deepest->geom1));
   }
 
+  void allow(const scene::Allowance& allowance) override {
+    if (!(allowance == allowance_)) allowance_ = allowance;
+  }
+
  private:
+  [[nodiscard]] bool is_allowed(const mjContact& contact) const {
+    if (allowance_.empty()) return false;
+    for (const int geom : {contact.geom1, contact.geom2}) {
+      const ShapeId id = shape(geom);
+      if (id.kind == Kind::obstacle &&
+          allows(environment_.obstacles()[static_cast<std::size_t>(id.index)].name))
+        return true;
+      if (id.kind == Kind::map && allows(Eigen::Vector3d::Map(contact.pos))) return true;
+    }
+    return false;
+  }
+  [[nodiscard]] bool allows(const std::string& obstacle) const {
+    const auto& names = allowance_.obstacles;
+    return std::find(names.begin(), names.end(), obstacle) != names.end();
+  }
+  // A voxel that a box touches is allowed as a whole.
+  [[nodiscard]] bool allows(const Eigen::Vector3d& world) const {
+    const Eigen::Vector3d p = setup_.scene.map->pose.inverse() * world;
+    const double voxel = environment_.summary().resolution_m;
+    return std::any_of(allowance_.boxes_m.begin(), allowance_.boxes_m.end(), [&](const auto& box) {
+      return (p.array() >= box.lo.array() - voxel).all() &&
+             (p.array() <= box.hi.array() + voxel).all();
+    });
+  }
+
   // Makes MuJoCo's model, at rest at q = 0, with room for so many boxes of the map.
   void build(int map_boxes) {
     data_.reset();
@@ -240,6 +270,7 @@ class MujocoPlant final : public simulation::Plant {
   simulation::PlantSetup setup_;
   Description description_;
   scene::Environment environment_;
+  scene::Allowance allowance_;
   std::optional<scene::SelfField> self_;
   dynamics::Workspace ws_;
   ModelPointer model_;

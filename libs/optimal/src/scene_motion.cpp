@@ -58,6 +58,10 @@ void check_scene(const scene::Scene& scene, bool has_paths) {
     if (type == scene::GoalType::follow)
       refuse_scene(scene,
                    fmt::format("/goals/{}: follows a target, expected a goal to arrive at", i));
+    if (!scene.goals[i].may_touch.empty())
+      refuse_scene(scene, fmt::format("/goals/{}/may_touch: is given, expected none: optimised "
+                                      "motions keep away from all obstacles",
+                                      i));
     if (type != scene::GoalType::joint && !has_paths)
       refuse_scene(scene,
                    fmt::format("/goals/{}: is a {}, expected joint positions, or a guide that "

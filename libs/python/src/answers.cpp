@@ -17,7 +17,7 @@ constexpr std::array reason_names{"planner", "late", "measurement", "tracking", 
 struct AnswerCopy {
   control::ControlState state;
   control::StopReason reason;
-  bool saturated, stopping;
+  bool saturated, stopping, may_touch;
   std::uint64_t goals_number, snapshot, load, refused_load;
   std::size_t goal_index;
   std::string cause, load_refusal;
@@ -31,6 +31,7 @@ AnswerCopy copy_of(const control::Answer& a) {
                  a.reason,
                  a.saturated,
                  a.stopping,
+                 a.may_touch != nullptr,
                  a.goals_number,
                  a.snapshot,
                  a.load,
@@ -170,6 +171,8 @@ void add_answer(py::module_& module) {
       .def_readonly("saturated", &AnswerCopy::saturated, "Whether a limit reduced the torque.")
       .def_readonly("stopping", &AnswerCopy::stopping,
                     "Whether the shield refused the planner's answer.")
+      .def_readonly("may_touch", &AnswerCopy::may_touch,
+                    "Whether the current goal may touch something, which no proof regards.")
       .def_readonly("goals_number", &AnswerCopy::goals_number,
                     "Number of the list of goals: 0 for the scene's, or of set_goals().")
       .def_readonly("goal_index", &AnswerCopy::goal_index, "Index of the current goal in it.")

@@ -389,6 +389,9 @@ std::unique_ptr<World> make_world(const simulation::Recorded& recorded, std::str
     world->notes.push_back(fmt::format(
         "{}: changes during the run, from {} s on; cells and clearances are those at 0 s",
         scene.map->file.string(), scene.map->changes.front().time_s));
+  if (std::any_of(scene.goals.begin(), scene.goals.end(),
+                  [](const auto& goal) { return !goal.may_touch.empty(); }))
+    world->notes.push_back("goals may touch obstacles: clearances are those of all obstacles");
   Json goals = Json::array(), obstacles = Json::array();
   for (const auto& goal : scene.goals)
     if (goal.type != scene::GoalType::follow)  // it has no place of its own

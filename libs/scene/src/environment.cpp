@@ -122,6 +122,22 @@ Environment Environment::with_change(const MapChange& change) const {
   return copy;
 }
 
+Environment Environment::with_allowance(const Allowance& allowance) const {
+  Environment copy = *this;
+  if (map_spec_ && !allowance.boxes_m.empty()) {
+    MapChangeSpec change;
+    change.free_m = allowance.boxes_m;
+    copy = with_change(change);
+  }
+  for (std::size_t k = 0; k < obstacles_.size(); ++k) {
+    const auto& names = allowance.obstacles;
+    if (std::find(names.begin(), names.end(), obstacles_[k].name) == names.end()) continue;
+    copy.obstacles_[k].appears_s = std::numeric_limits<double>::infinity();
+    copy.moves_[k] = 0;
+  }
+  return copy;
+}
+
 void Environment::prepare() const {
   map_->prepare();
   if (summary_.unknown == UnknownPolicy::block) unknown_->prepare();

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/text.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "rotation.hpp"
@@ -216,22 +217,37 @@ std::vector<Obstacle> read_obstacles(const Reader& in, const std::filesystem::pa
   return out;
 }
 
+std::vector<Box> read_boxes(const Reader& in, const char* key) {
+  std::vector<Box> out;
+  for (const auto& six : in.get<std::vector<std::vector<double>>>(key, {})) {
+    const Box box{{six[0], six[1], six[2]}, {six[3], six[4], six[5]}};
+    if (!(box.lo.array() < box.hi.array()).all())
+      in.fail(fmt::format("{}/{}", key, out.size()).c_str(),
+              "the low corner is not below the high one on each axis, expected [x, y, z, x, y, z]");
+    out.push_back(box);
+  }
+  return out;
+}
+
+// Cameras may find obstacles that no scene names.
+void check_named(const Reader& in, const Scene& scene) {
+  if (!scene.sensors.empty()) return;
+  std::vector<std::string> names;
+  for (const Obstacle& obstacle : scene.obstacles) names.push_back(obstacle.name);
+  for (std::size_t i = 0; i < scene.goals.size(); ++i)
+    for (const std::string& name : scene.goals[i].may_touch.obstacles)
+      if (std::find(names.begin(), names.end(), name) == names.end())
+        in.fail(fmt::format("goals/{}/may_touch/obstacles", i).c_str(),
+                fmt::format("there is no obstacle '{}', expected one of the scene's {}{}", name,
+                            names.size(), did_you_mean(name, names)));
+}
+
 MapChangeSpec read_map_change(const Reader& in, const std::filesystem::path& folder) {
   MapChangeSpec change;
   change.time_s = in.get("time_s", 0.0);
   if (const auto file = in.maybe<std::string>("file")) change.file = resolve_path(folder, *file);
-  const auto boxes = [&](const char* key, std::vector<Box>& out) {
-    for (const auto& six : in.get<std::vector<std::vector<double>>>(key, {})) {
-      const Box box{{six[0], six[1], six[2]}, {six[3], six[4], six[5]}};
-      if (!(box.lo.array() < box.hi.array()).all())
-        in.fail(
-            fmt::format("{}/{}", key, out.size()).c_str(),
-            "the low corner is not below the high one on each axis, expected [x, y, z, x, y, z]");
-      out.push_back(box);
-    }
-  };
-  boxes("free_boxes_m", change.free_m);
-  boxes("occupied_boxes_m", change.occupied_m);
+  change.free_m = read_boxes(in, "free_boxes_m");
+  change.occupied_m = read_boxes(in, "occupied_boxes_m");
   if (!change.file && change.free_m.empty() && change.occupied_m.empty())
     in.fail("file", "is missing, expected a file, free_boxes_m or occupied_boxes_m");
   return change;
@@ -358,6 +374,10 @@ Goal read_goal(const Reader& in, const std::filesystem::path& folder) {
   goal.speed_max = in.get("speed_max", goal.speed_max);
   goal.tip_speed_max_m_s = in.maybe<double>("tip_speed_max_m_s");
   if (follow) read_target(in, folder, goal);
+  const Reader may_touch = in.child("may_touch");
+  goal.may_touch = {read_boxes(may_touch, "boxes_m"),
+                    may_touch.get<std::vector<std::string>>("obstacles", {})};
+  check(goal.may_touch, in.place_of("may_touch"));
   return goal;
 }
 
@@ -700,6 +720,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
   scene.plant = read_plant(in, in.child("plant"), scene.actuation.type);
   scene.safety = read_safety(in.child("safety"));
   scene.events = read_events(in, base_dir, scene);
+  check_named(in, scene);
   return scene;
 }
 

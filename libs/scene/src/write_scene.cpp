@@ -46,6 +46,13 @@ Json path_or_null(const std::optional<std::filesystem::path>& path) {
   return path ? Json(path->string()) : Json(nullptr);
 }
 
+Json boxes_json(const std::vector<Box>& boxes) {
+  Json list = Json::array();
+  for (const Box& box : boxes)
+    list.push_back({box.lo.x(), box.lo.y(), box.lo.z(), box.hi.x(), box.hi.y(), box.hi.z()});
+  return list;
+}
+
 Json follow_json(const Goal& goal) {
   Json out{{"type", type_name(goal)},
            {"tracks", goal.position_only ? "position" : "pose"},
@@ -69,8 +76,7 @@ Json follow_json(const Goal& goal) {
   return out;
 }
 
-Json goal_json(const Goal& goal) {
-  if (goal.type == GoalType::follow) return follow_json(goal);
+Json goal_to_reach_json(const Goal& goal) {
   Json out{{"type", type_name(goal)}};
   if (goal.trajectory) {
     out["trajectory"] = to_json(*goal.trajectory);
@@ -91,17 +97,17 @@ Json goal_json(const Goal& goal) {
   return out;
 }
 
+Json goal_json(const Goal& goal) {
+  Json out = goal.type == GoalType::follow ? follow_json(goal) : goal_to_reach_json(goal);
+  out["may_touch"] = to_json(goal.may_touch);
+  return out;
+}
+
 Json change_json(const MapChangeSpec& change) {
-  const auto boxes = [](const std::vector<Box>& from) {
-    Json list = Json::array();
-    for (const Box& box : from)
-      list.push_back({box.lo.x(), box.lo.y(), box.lo.z(), box.hi.x(), box.hi.y(), box.hi.z()});
-    return list;
-  };
   return {{"time_s", change.time_s},
           {"file", change.file ? Json(change.file->generic_string()) : Json(nullptr)},
-          {"free_boxes_m", boxes(change.free_m)},
-          {"occupied_boxes_m", boxes(change.occupied_m)}};
+          {"free_boxes_m", boxes_json(change.free_m)},
+          {"occupied_boxes_m", boxes_json(change.occupied_m)}};
 }
 
 Json map_json(const MapSpec& map) {
@@ -363,6 +369,11 @@ Json motion_json(const Motion& motion) {
           {"velocity_m_s", array(line.velocity_m_s)},
           {"start_s", line.start_s},
           {"duration_s", std::isinf(line.duration_s) ? Json(nullptr) : Json(line.duration_s)}};
+}
+
+Json to_json(const Allowance& allowance) {
+  if (allowance.empty()) return nullptr;
+  return {{"boxes_m", boxes_json(allowance.boxes_m)}, {"obstacles", allowance.obstacles}};
 }
 
 Json to_json(const Obstacle& o) {

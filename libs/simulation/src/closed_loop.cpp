@@ -148,6 +148,8 @@ void ClosedLoop::let_controller_observe() {
   const double since_s = control::steady_clock_s();
   controller_->observe(plant_->node().time_s, q_shown_, v_shown_);
   observing_s_ = control::steady_clock_s() - since_s;
+  const control::Answer& answer = controller_->answer();
+  judge_->allow(answer.may_touch, std::min(answer.goal_index, scene_.goals.size() - 1));
   const control::GoalTracker& goals = controller_->goals();
   while (goals_reached_ < goals.index())
     recorder_->event(plant_->node().time_s,

@@ -21,7 +21,9 @@ bool controller_sees_all(const scene::Scene& scene) {
   return exact && scene.events.empty() && scene.sensors.empty() &&
          !(scene.map && !scene.map->changes.empty()) &&
          std::all_of(scene.obstacles.begin(), scene.obstacles.end(),
-                     [](const auto& o) { return o.known && !o.judge_only; });
+                     [](const auto& o) { return o.known && !o.judge_only; }) &&
+         std::all_of(scene.goals.begin(), scene.goals.end(),
+                     [](const auto& goal) { return goal.may_touch.empty(); });
 }
 
 void raise(std::optional<double>& most, double value) {
@@ -30,7 +32,7 @@ void raise(std::optional<double>& most, double value) {
 
 }  // namespace
 
-Judge::Judge(const scene::Scene& scene, const model::Model& model, const Plant& plant,
+Judge::Judge(const scene::Scene& scene, const model::Model& model, Plant& plant,
              control::WorldView* controllers)
     : scene_(scene),
       model_(model),
@@ -47,6 +49,20 @@ Judge::Judge(const scene::Scene& scene, const model::Model& model, const Plant& 
   if (own_) view_ = own_.get();
   min_clearance_ = view_->influence_m();
   min_self_clearance_ = view_->self_influence_m();
+  if (own_ && !scene.goals.empty() && !scene.goals.front().may_touch.empty())
+    allow(&scene.goals.front().may_touch, 0);
+}
+
+// Motions that leave this node are judged by what is allowed from here on.
+void Judge::allow(const scene::Allowance* may_touch, std::size_t goal) {
+  const scene::Allowance next = may_touch != nullptr ? *may_touch : scene::Allowance{};
+  if (next == may_touch_ && (next.empty() || goal == goal_)) return;
+  may_touch_ = next;
+  goal_ = goal;
+  if (!next.empty()) allowed_.push_back({goal + 1, scene::to_json(next), view_->influence_m()});
+  own_->allow(next);
+  plant_.allow(next);
+  own_->look(plant_.node().q, plant_.node().time_s);
 }
 
 void Judge::observe_node() {
@@ -70,6 +86,8 @@ void Judge::note_limits() {
 void Judge::note_clearance() {
   min_clearance_ = std::min(min_clearance_, view_->clearance_m());
   min_self_clearance_ = std::min(min_self_clearance_, view_->self_clearance_m());
+  if (!may_touch_.empty())
+    allowed_.back().clearance_m = std::min(allowed_.back().clearance_m, view_->whole_clearance_m());
 }
 
 void Judge::certify() {
@@ -159,7 +177,7 @@ std::optional<log::Result::MoverContact> Judge::mover_contact() const {
   return out;
 }
 
-std::vector<std::string> Judge::describe_goals_in_contact() const {
+std::vector<std::string> Judge::describe_goals_in_contact() {
   std::vector<std::string> out;
   if (!view_->has_obstacles() && !view_->has_self()) return out;
   const std::array<double, 1> point{0.0};
@@ -168,6 +186,7 @@ std::vector<std::string> Judge::describe_goals_in_contact() const {
     const auto& goal = scene_.goals[i];
     if (goal.type == scene::GoalType::follow) break;  // it moves
     const bool of_joints = goal.type == scene::GoalType::joint;
+    if (own_) own_->allow(goal.may_touch);
     const scene::Shapes placed =
         of_joints ? view_->place(goal.q) : scene::Shapes{{&goal.pose.p(), 1}, point};
     scene::Contact deepest;
@@ -184,6 +203,7 @@ std::vector<std::string> Judge::describe_goals_in_contact() const {
           fmt::format("goal {}: the arm touches itself: {} are {:.2g} mm inside each other", i + 1,
                       view_->self_field()->describe(worst.pair), -1e3 * worst.distance));
   }
+  if (own_) own_->allow(scene_.goals.front().may_touch);
   return out;
 }
 
@@ -204,6 +224,7 @@ void Judge::fill(log::Result& result) const {
   result.position_excess = position_excess_;
   result.speed_excess = speed_excess_;
   result.tightest_step_m = tightest_step_m_;
+  result.may_touch = allowed_;
   if (checked_steps_ > 0)
     result.certified_share =
         static_cast<double>(certified_steps_) / static_cast<double>(checked_steps_);

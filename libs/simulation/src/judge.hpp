@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,7 +20,7 @@ class Judge {
   /// @param model the arm as it is, kept by reference, as are the others
   /// @param controllers what the controller sees: judged by that if nothing is hidden from it; null
   ///        if that is not known
-  Judge(const scene::Scene& scene, const model::Model& model, const Plant& plant,
+  Judge(const scene::Scene& scene, const model::Model& model, Plant& plant,
         control::WorldView* controllers);
 
   [[nodiscard]] control::WorldView& view() noexcept { return *view_; }
@@ -35,6 +36,8 @@ class Judge {
   void change_map(const scene::MapChangeSpec& change) { own_->change_map(change); }
   /// The arm carries something else: its model has changed, in place.
   void take_load();
+  /// Goal `index` may touch something from this node on, or, where it is null, nothing.
+  void allow(const scene::Allowance* may_touch, std::size_t goal);
   /// Looks at the node again after such a change.
   void look_again();
 
@@ -54,7 +57,7 @@ class Judge {
   /// else.
   [[nodiscard]] std::optional<log::Result::MoverContact> mover_contact() const;
   /// Describes goals at which the arm touches something.
-  [[nodiscard]] std::vector<std::string> describe_goals_in_contact() const;
+  [[nodiscard]] std::vector<std::string> describe_goals_in_contact();
 
   /// Counts the contacts of this node for the result, if the plant counts, too.
   void count_contacts(log::Result& result) const;
@@ -68,14 +71,17 @@ class Judge {
 
   const scene::Scene& scene_;
   const model::Model& model_;
-  const Plant& plant_;
+  Plant& plant_;
   control::ModelledLimits limits_;
   bool certifies_;                           ///< whether the scene asks for proofs
   std::unique_ptr<control::WorldView> own_;  ///< null if the controller sees all as it is
   control::WorldView* view_;                 ///< that, or the controller's
   bool certified_ = true, touching_ = false;
   std::string on_the_way_;
-  Plant::Contacts contacts_;  ///< by the plant
+  std::size_t goal_ = 0;                        ///< the current one
+  scene::Allowance may_touch_;                  ///< that of the current goal
+  std::vector<log::Result::MayTouch> allowed_;  ///< the last one is in force, if any is
+  Plant::Contacts contacts_;                    ///< by the plant
   double min_clearance_ = 0.0, min_self_clearance_ = 0.0;
   long certified_steps_ = 0, checked_steps_ = 0;
   std::optional<double> tightest_step_m_, position_excess_, speed_excess_;

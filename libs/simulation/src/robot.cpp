@@ -56,6 +56,7 @@ void Robot::measure(VectorXd& q, VectorXd& v) {
 }
 
 bool Robot::move(const control::Answer& setpoint) {
+  judge_->allow(setpoint.may_touch, setpoint.goal_index);
   for (long i = 0; i < steps_per_period_ && cause_.empty(); ++i) {
     actuation_->take(setpoint, i == 0);
     judge_->depart(actuation_->departure_velocity());

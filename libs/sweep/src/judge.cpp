@@ -194,6 +194,12 @@ Judge::Judge(const scene::Scene& scene)
       obstacles_(scene.obstacles),
       min_clearance_(infinity),
       min_self_clearance_(infinity) {
+  for (std::size_t i = 0; i < scene.goals.size(); ++i)
+    if (!scene.goals[i].may_touch.empty())
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: /goals/{}/may_touch: is given, expected none: any contact in a "
+                              "log counts",
+                              scene.name, i));
   for (const auto& obstacle : obstacles_) bounding_radii_.push_back(radius_around_center(obstacle));
   poses_.resize(obstacles_.size());
   const bool exact =

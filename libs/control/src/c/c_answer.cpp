@@ -57,6 +57,7 @@ hamelin_answer answer_of(hamelin_controller& of, const control::Answer& answer) 
   std::copy_n(wxyz.data(), 4, full.tip_quaternion_wxyz);
   full.series = answer.series.data();
   full.series_count = answer.series.size();
+  full.may_touch = answer.may_touch != nullptr ? 1 : 0;
   return full;
 }
 

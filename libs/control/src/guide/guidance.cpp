@@ -80,6 +80,7 @@ void Guidance::ask(const Now& now, GuideSearch& search) {
   GuideRequest& request = search.request();
   request.number = ++asked_;
   request.time_s = now.time_s;
+  request.allowance = now.allowance;
   request.q = now.q;
   request.goal.type = now.goal.type;
   if (now.goal.type == scene::GoalType::joint) request.goal.q = now.goal.q;

@@ -36,6 +36,7 @@ class Guidance {
     const scene::Goal& goal;           ///< the current one
     std::uint64_t goal_number;         ///< another one whenever the goal or the load is another one
     std::uint64_t world;               ///< number of the snapshot
+    std::uint64_t allowance;           ///< what the goal may touch, see World::allow()
     const scene::MotionState* target;  ///< that a follow goal has; else null
     const CertifiedPath* in_force;     ///< along which a stop goes on; else null
   };

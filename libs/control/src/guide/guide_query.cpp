@@ -28,9 +28,9 @@ GuideQuery::GuideQuery(const model::Model& model, const World& world, const Worl
   (void)refresh(0.0);
 }
 
-std::uint64_t GuideQuery::refresh(double time_s) {
+std::uint64_t GuideQuery::refresh(double time_s, std::uint64_t allowance) {
   time_s_ = time_s;
-  const std::uint64_t number = query_.refresh();
+  const std::uint64_t number = query_.refresh(allowance);
   lines_.set_environment(query_.snapshot().environment, time_s);
   edges_.set_environment(query_.snapshot().environment, time_s);
   return number;

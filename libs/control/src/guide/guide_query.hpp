@@ -23,7 +23,7 @@ class GuideQuery final : public search::Query {
 
   /// Takes the newest snapshot, as it is at a time; to be called once before anything else.
   /// @return its number
-  std::uint64_t refresh(double time_s);
+  std::uint64_t refresh(double time_s, std::uint64_t allowance = 0);
 
   /// WorldSnapshot::standing of the snapshot.
   [[nodiscard]] std::uint64_t standing() const noexcept { return query_.snapshot().standing; }

@@ -75,7 +75,7 @@ void GuideSearch::answer() {
   auto out = std::make_unique<GuideAnswer>();
   const long before = query_.checks();
   out->number = request_.number;
-  out->snapshot = query_.refresh(request_.time_s);
+  out->snapshot = query_.refresh(request_.time_s, request_.allowance);
   out->kept = still_clear();
   out->checks = query_.checks() - before;
   try {

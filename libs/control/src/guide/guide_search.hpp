@@ -17,9 +17,10 @@ struct GuideRequest {
   /// @param points_max the largest number of way-points of `kept`
   GuideRequest(Eigen::Index dof, Eigen::Index points_max);
 
-  std::uint64_t number = 0;  ///< of the request; 0: none
-  double time_s = 0.0;       ///< of the tick
-  Eigen::VectorXd q;         ///< where the search begins
+  std::uint64_t number = 0;     ///< of the request; 0: none
+  double time_s = 0.0;          ///< of the tick
+  std::uint64_t allowance = 0;  ///< number of what may be touched, see World::allow()
+  Eigen::VectorXd q;            ///< where the search begins
   scene::Goal goal;
   std::uint64_t search = 0;  ///< number of the search, see search::Problem
   /// A path that is kept if it is still clear: its first kept_count columns; 0: none.

@@ -174,7 +174,9 @@ PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& w
   plan.seed = scene.seed;
   plan.goal_count = scene.goals.size();
   VectorXd start = scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(arm.dof());
+  const std::vector<std::uint64_t> allowances = world.allow(allowances_of(scene.goals));
   for (const scene::Goal& goal : scene.goals) {
+    query.refresh(0.0, allowances[plan.goals.size()]);
     plan.goals.push_back(planned(search, query, {start, {goal}, plan.goals.size() + 1}));
     const PlannedGoal& found = plan.goals.back();
     if (!found.path.found()) break;

@@ -74,13 +74,14 @@ void Controller::look(bool first) {
   answer_.snapshot = arm_->view.snapshot();
   take_goals();
   answer_.goals_number = goal_list_->number;
-  if (answer_.state == ControlState::stopping) return;
+  if (answer_.state == ControlState::stopping) return allow_for_goal();
   answer_.state = ControlState::running;
   answer_.cause = {};
   update_reference();
   while (!on_the_way() && goals_.advance(arm_->view.poses(), this->q(), this->v()))
     update_reference();
   answer_.goal_index = goals_.index();
+  allow_for_goal();
   update_target();
   if (goals_.all_reached())
     answer_.state = ControlState::reached;

@@ -147,7 +147,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       newest_goals_(scene_.goals),
       newest_arm_(arm_.get()),
       measured_(static_cast<std::size_t>(nominal_.dof())),
-      mail_(std::make_unique<Mailbox>(scene_.goals, arm_->certify(scene_.goals, arm_setup()))),
+      mail_(std::make_unique<Mailbox>(first_goals())),
       goal_list_(&mail_->goals.take()),
       reference_(nominal_.dof()),
       path_reference_(std::make_unique<PathReference>(nominal_.dof())),
@@ -157,6 +157,12 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   expect_target(scene_.goals);
   answer_.torque = answer_.q_next = answer_.v_next = VectorXd::Zero(nominal_.dof());
   make_guidance();
+}
+
+std::unique_ptr<GoalList> Controller::first_goals() {
+  std::vector<std::uint64_t> allowances = world_.allow(allowances_of(scene_.goals));
+  GoalList::Motions motions = arm_->certify(scene_.goals, allowances, arm_setup());
+  return std::make_unique<GoalList>(0, scene_.goals, std::move(allowances), std::move(motions), 0);
 }
 
 void Controller::make_guidance() {

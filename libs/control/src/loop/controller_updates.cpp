@@ -44,13 +44,21 @@ void check_size(std::span<const scene::Payload> payloads, const model::Model& lo
 
 std::uint64_t Controller::set_goals(std::vector<scene::Goal> goals) {
   check_goals(goals, scene_, nominal_, path_points_max_, plugin());
+  for (std::size_t i = 0; i < goals.size(); ++i) {
+    try {
+      world_.require_obstacles(goals[i].may_touch);
+    } catch (const Error& e) {
+      throw Error(e.code(), fmt::format("goal {}: may_touch: {}", i + 1, e.what()));
+    }
+  }
   const std::lock_guard load_lock(load_mutex_);
-  GoalList::Motions motions = newest_arm_->certify(goals, arm_setup());
+  const std::vector<std::uint64_t> allowances = world_.allow(allowances_of(goals));
+  GoalList::Motions motions = newest_arm_->certify(goals, allowances, arm_setup());
   const std::lock_guard lock(goals_mutex_);
   newest_goals_ = goals;
   expect_target(goals);
   keep_motions(++goals_number_, motions);
-  mail_->goals.publish(std::make_unique<GoalList>(goals_number_, std::move(goals),
+  mail_->goals.publish(std::make_unique<GoalList>(goals_number_, std::move(goals), allowances,
                                                   std::move(motions), load_number_));
   return goals_number_;
 }
@@ -263,6 +271,7 @@ void Controller::take_load() {
   taken_serial_ = newest.serial;
   if (newest.number == answer_.load && !resumes) return;
   LoadedArm& fresh = *newest.arm;
+  (void)fresh.view.allow(arm_->view.allowance());
   fresh.drive->continue_from(*arm_->drive);
   if (resumes) fresh.drive->resume();
   LineBuffer defect;
@@ -320,6 +329,16 @@ void Controller::take_goals() {
   forsaken_ = nullptr;
 }
 
+// Touching another thing is allowed in another world.
+void Controller::allow_for_goal() {
+  const std::size_t index = std::min(goals_.index(), goals_.size() - 1);
+  const scene::Allowance& may_touch = goal_list_->goals[index].may_touch;
+  answer_.may_touch = may_touch.empty() ? nullptr : &may_touch;
+  if (!arm_->view.allow(goal_list_->allowances[index])) return;
+  answer_.snapshot = arm_->view.snapshot();
+  see();
+}
+
 // A target starts where the tip is when its goal becomes the current one.
 void Controller::update_target() {
   const scene::Goal* const goal = goals_.follows() ? &goals_.goal() : nullptr;
@@ -373,10 +392,10 @@ const hamelin_goal* Controller::goal_for_planner() {
 }
 
 void Controller::update_guidance() {
-  const Guidance::News news =
-      guidance_->update({time_s_, period_s_, q(), goals_.goal(), listed_number_ + 1,
-                         arm_->view.snapshot(), answer_.target, path_in_force()},
-                        *arm_->guide);
+  const Guidance::News news = guidance_->update(
+      {time_s_, period_s_, q(), goals_.goal(), listed_number_ + 1, arm_->view.snapshot(),
+       arm_->view.allowance(), answer_.target, path_in_force()},
+      *arm_->guide);
   if (const std::uint64_t number = guidance_->number(); number != guidance_number_) {
     guidance_number_ = number;
     ++goal_.number;

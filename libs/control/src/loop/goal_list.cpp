@@ -79,9 +79,13 @@ void check_tip_goal(const scene::Goal& goal, std::size_t i) {
 
 }  // namespace
 
-GoalList::GoalList(std::uint64_t of_number, std::vector<scene::Goal> all, Motions of_goals,
-                   std::uint64_t of_load)
-    : number(of_number), goals(std::move(all)), motions(std::move(of_goals)), load(of_load) {
+GoalList::GoalList(std::uint64_t of_number, std::vector<scene::Goal> all,
+                   std::vector<std::uint64_t> allowed, Motions of_goals, std::uint64_t of_load)
+    : number(of_number),
+      goals(std::move(all)),
+      allowances(std::move(allowed)),
+      motions(std::move(of_goals)),
+      load(of_load) {
   for (const auto& goal : goals) for_planner.push_back(to_c(goal));
 }
 
@@ -122,6 +126,7 @@ void check_goals(const std::vector<scene::Goal>& goals, const scene::Scene& scen
     check(!goal.trajectory || planner.follows_trajectories(), i,
           "trajectory: the planner does not follow trajectories, expected one that does, such as "
           "hybrid");
+    scene::check(goal.may_touch, fmt::format("goal {}: may_touch", i + 1));
     check(goal.speed_max > 0.0, i,
           fmt::format("speed_max: {} is not allowed, expected more than 0", goal.speed_max));
   }
@@ -157,6 +162,12 @@ std::string joints_defect(const scene::JointTrajectory& trajectory, const model:
       return fmt::format("joint {} is '{}', expected '{}' (the joints of '{}' in their order)",
                          i + 1, trajectory.joints[i], links[i].joint.name, model.robot().name);
   return {};
+}
+
+std::vector<scene::Allowance> allowances_of(const std::vector<scene::Goal>& goals) {
+  std::vector<scene::Allowance> out;
+  for (const auto& goal : goals) out.push_back(goal.may_touch);
+  return out;
 }
 
 std::size_t longest_path(const std::vector<scene::Goal>& goals) {

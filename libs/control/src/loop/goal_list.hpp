@@ -18,14 +18,16 @@ namespace hamelin::control {
 struct GoalList {
   /// Of each goal what its trajectory is proved as; null: it has none, or there is no proof.
   using Motions = std::vector<std::shared_ptr<const CertifiedPath>>;
-  /// @param goals at least one @param motions one per goal @param load for which they are proved
-  GoalList(std::uint64_t number, std::vector<scene::Goal> goals, Motions motions,
-           std::uint64_t load);
+  /// @param goals at least one; allowances, motions: one per goal
+  /// @param load for which the motions are proved
+  GoalList(std::uint64_t number, std::vector<scene::Goal> goals,
+           std::vector<std::uint64_t> allowances, Motions motions, std::uint64_t load);
   GoalList(const GoalList&) = delete;
   GoalList& operator=(const GoalList&) = delete;
 
   std::uint64_t number;  ///< 0 for the goals of the scene; counts the lists that replaced them
   std::vector<scene::Goal> goals;
+  std::vector<std::uint64_t> allowances;  ///< what each goal may touch, see World::allow()
   Motions motions;
   std::uint64_t load;                     ///< Answer::load for which the motions are proved
   std::vector<hamelin_goal> for_planner;  ///< the same; pointers refer to `goals`
@@ -51,6 +53,9 @@ void check_goals(const std::vector<scene::Goal>& goals, const scene::Scene& scen
 /// What is wrong with the joints of a trajectory for this arm; empty if nothing is.
 [[nodiscard]] std::string joints_defect(const scene::JointTrajectory& trajectory,
                                         const model::Model& model);
+
+/// What each goal may touch.
+[[nodiscard]] std::vector<scene::Allowance> allowances_of(const std::vector<scene::Goal>& goals);
 
 /// The largest number of way-points of the paths of these goals; 0 without paths.
 [[nodiscard]] std::size_t longest_path(const std::vector<scene::Goal>& goals);

@@ -31,11 +31,12 @@ LoadedArm::LoadedArm(const scene::Scene& scene, model::Model nominal, const Json
 }
 
 std::vector<std::shared_ptr<const CertifiedPath>> LoadedArm::certify(
-    const std::vector<scene::Goal>& goals, const ArmSetup& arm) const {
+    const std::vector<scene::Goal>& goals, const std::vector<std::uint64_t>& allowances,
+    const ArmSetup& arm) const {
   std::vector<std::shared_ptr<const CertifiedPath>> out(goals.size());
   for (std::size_t i = 0; i < goals.size(); ++i) {
     if (!goals[i].trajectory || !trajectories_) continue;
-    auto result = trajectories_->certify(*goals[i].trajectory, *arm.world.latest());
+    auto result = trajectories_->certify(*goals[i].trajectory, *arm.world.latest(allowances[i]));
     const bool proved = result.motion != nullptr;
     out[i] = std::move(result.motion);
     if (!arm.log || result.cause.empty()) continue;

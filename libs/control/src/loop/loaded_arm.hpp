@@ -60,9 +60,11 @@ struct LoadedArm {
   std::unique_ptr<GuideSearch> guide;  ///< null if the scene asks for none
 
   /// Proves the trajectories of goals in the newest world. For writers, one at a time.
+  /// @param allowances what each goal may touch, see World::allow()
   /// @return for each goal its motion; null without a trajectory or a proof
   [[nodiscard]] std::vector<std::shared_ptr<const CertifiedPath>> certify(
-      const std::vector<scene::Goal>& goals, const ArmSetup& arm) const;
+      const std::vector<scene::Goal>& goals, const std::vector<std::uint64_t>& allowances,
+      const ArmSetup& arm) const;
 
   /// The stop that acts where no answer does.
   [[nodiscard]] Stop& stop() noexcept { return shield ? shield->stop() : *unverified_stop_; }

@@ -38,8 +38,8 @@ struct StopRequest {
 /// What other threads have sent to the tick, which takes the newest of each without waiting. The
 /// world has a place of its own, World.
 struct Mailbox {
-  Mailbox(const std::vector<scene::Goal>& first_goals, GoalList::Motions motions)
-      : goals(std::make_unique<GoalList>(0, first_goals, std::move(motions), 0)),
+  explicit Mailbox(std::unique_ptr<GoalList> first_goals)
+      : goals(std::move(first_goals)),
         params(std::make_unique<NewParams>()),
         load(std::make_unique<NewLoad>()),
         stop(std::make_unique<StopRequest>()),

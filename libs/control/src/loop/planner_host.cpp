@@ -24,12 +24,12 @@ class Handle final : public planning::QueryServices {
  public:
   Handle(const model::Model& model, const World& world, const WorldView& view,
          const std::atomic<double>& time_s)
-      : query_(model, world, view), now_s_(time_s) {
+      : query_(model, world, view), view_(view), now_s_(time_s) {
     (void)refresh();
   }
   Snapshot refresh() override {
     time_s_ = now_s_.load();
-    return {query_.refresh(), time_s_};
+    return {query_.refresh(view_.allowance()), time_s_};
   }
   void clearance(const double* q, std::size_t count, double time_ahead_s, double at_least_m,
                  double* out) override {
@@ -69,6 +69,7 @@ class Handle final : public planning::QueryServices {
 
  private:
   WorldQuery query_;
+  const WorldView& view_;
   const std::atomic<double>& now_s_;
   double time_s_ = 0.0;
 };

@@ -180,19 +180,29 @@ std::size_t World::shapes_max() const noexcept {
 
 World::View World::view_of_latest() const {
   std::shared_ptr<const WorldSnapshot> snapshot = latest();
+  return view_of(std::move(snapshot));
+}
+
+World::View World::view_of(std::shared_ptr<const WorldSnapshot> snapshot) const {
   scene::Environment::Scratch scratch(snapshot->environment, shapes_max());
-  return {std::move(snapshot), std::move(scratch)};
+  View view{std::move(snapshot), std::move(scratch), {}};
+  for (const auto& allowed : view.snapshot->allowed) view.allowed.push_back(view_of(allowed));
+  return view;
 }
 
 std::uint64_t World::publish(scene::Environment environment, std::vector<std::int32_t> ids,
                              Changes changes) {
   if (options_.prepare) environment.prepare();
-  const std::uint64_t number = latest_ ? latest_->number + 1 : 0;
-  auto snapshot = std::make_shared<const WorldSnapshot>(
-      WorldSnapshot{number, std::move(environment), std::move(ids),
-                    changes == Changes::standing || !latest_ ? number : latest_->standing});
-  auto view = std::make_unique<View>(
-      View{snapshot, scene::Environment::Scratch(snapshot->environment, shapes_max())});
+  const std::uint64_t number = latest_ ? ++last_number_ : 0;
+  auto fresh = std::make_shared<WorldSnapshot>();
+  fresh->number = number;
+  fresh->environment = std::move(environment);
+  fresh->obstacle_ids = std::move(ids);
+  fresh->standing = changes == Changes::standing || !latest_ ? number : latest_->standing;
+  for (const Allowed& entry : allowed_)
+    fresh->allowed.push_back(snapshot_with(entry, *fresh, changes));
+  std::shared_ptr<const WorldSnapshot> snapshot = std::move(fresh);
+  auto view = std::make_unique<View>(view_of(snapshot));
   {
     const std::lock_guard lock(latest_mutex_);
     latest_.swap(snapshot);
@@ -328,14 +338,25 @@ std::uint64_t World::change_map(const scene::MapChangeSpec& change) {
 
 std::uint64_t World::publish_map(const scene::Environment& environment) {
   if (options_.prepare) environment.prepare();
+  std::vector<Allowed> allowed = allowed_in(environment);
   const std::lock_guard lock(mutex_);
+  allowed_ = std::move(allowed);
   return publish(environment.with_obstacles(latest_->environment.obstacles()),
                  latest_->obstacle_ids, Changes::standing);
 }
 
-std::shared_ptr<const WorldSnapshot> World::latest() const {
+std::shared_ptr<const WorldSnapshot> World::latest(std::uint64_t allowance) const {
   const std::lock_guard lock(latest_mutex_);
+  if (allowance != 0)
+    for (const auto& snapshot : latest_->allowed)
+      if (snapshot->allowance == allowance) return snapshot;
   return latest_;
+}
+
+void World::require_obstacles(const scene::Allowance& allowance) const {
+  const auto snapshot = latest();
+  for (const std::string& name : allowance.obstacles)
+    (void)require_name(snapshot->environment.obstacles(), name);
 }
 
 }  // namespace hamelin::control

@@ -44,8 +44,8 @@ WorldQuery::WorldQuery(const model::Model& model, const World& world, const Worl
   }
 }
 
-std::uint64_t WorldQuery::refresh() {
-  auto newest = world_.latest();
+std::uint64_t WorldQuery::refresh(std::uint64_t allowance) {
+  auto newest = world_.latest(allowance);
   scratch_ = scene::Environment::Scratch(newest->environment,
                                          std::max<std::size_t>(1, model_.shapes().size()));
   snapshot_ = std::move(newest);

@@ -26,7 +26,8 @@ class WorldQuery {
   WorldQuery& operator=(const WorldQuery&) = delete;
 
   /// Takes the newest snapshot; to be called once before anything else. @return its number
-  std::uint64_t refresh();
+  /// @param allowance leaves out what may be touched, see World::allow()
+  std::uint64_t refresh(std::uint64_t allowance = 0);
   [[nodiscard]] const WorldSnapshot& snapshot() const noexcept { return *snapshot_; }
   [[nodiscard]] std::size_t dof() const noexcept { return static_cast<std::size_t>(q_.size()); }
 

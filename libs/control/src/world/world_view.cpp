@@ -44,10 +44,11 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, const
 std::unique_ptr<WorldView> WorldView::for_other_load(const scene::Scene& scene,
                                                      const model::Model& model,
                                                      const WorldView& other) {
-  scene::Environment same = *other.environment_;
+  scene::Environment same = *other.whole_;
   std::unique_ptr<WorldView> view(new WorldView(
       scene, model, other.influence_, Own(std::move(same), model.shapes().size()), nullptr, 0));
   view->seen_ = other.seen_;
+  view->allow(other.own_->allowance);
   return view;
 }
 
@@ -69,9 +70,10 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, doubl
       query_arm_(model) {
   if (world_ != nullptr) {
     first_view_ = world_->view_of_latest();
+    whole_ = &first_view_->snapshot->environment;
     see(*first_view_);
   } else {
-    environment_ = &own_->environment;
+    environment_ = whole_ = &own_->environment;
     scratch_ = &own_->scratch;
     contacts_max = environment_->contacts_max(model.shapes().size());
   }
@@ -102,10 +104,46 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, doubl
 
 bool WorldView::take_newest() {
   if (world_ == nullptr) return false;
-  World::View& newest = world_->take();
+  World::View& all = world_->take();
+  World::View& newest = all.with(allowance_);
+  whole_ = &all.snapshot->environment;
   if (environment_ == &newest.snapshot->environment) return false;
   see(newest);
   return true;
+}
+
+bool WorldView::allow(std::uint64_t allowance) {
+  if (allowance == allowance_) return false;
+  allowance_ = allowance;
+  return take_newest();
+}
+
+void WorldView::allow(const scene::Allowance& allowance) {
+  if (allowance == own_->allowance) return;
+  own_->allowance = allowance;
+  if (!own_->whole) own_->whole = own_->environment;
+  leave_out_allowed();
+}
+
+void WorldView::leave_out_allowed() {
+  own_->environment = own_->whole->with_allowance(own_->allowance);
+  if (own_->allowance.empty()) own_->whole.reset();
+  whole_ = own_->whole ? &*own_->whole : &own_->environment;
+  own_->scratch = scene::Environment::Scratch(own_->environment, model_.shapes().size());
+  current_ = false;
+}
+
+std::string WorldView::advance_map() {
+  current_ = false;
+  if (!own_->whole) return own_->environment.advance(time_s_);
+  std::string line = own_->whole->advance(time_s_);
+  if (!line.empty()) leave_out_allowed();
+  return line;
+}
+
+double WorldView::whole_clearance_m() const {
+  if (whole_ == environment_) return clearance_now_;
+  return whole_->clearance(arm_.view(), time_s_, clearance_now_);
 }
 
 void WorldView::see(World::View& view) {
@@ -118,7 +156,9 @@ void WorldView::see(World::View& view) {
 }
 
 void WorldView::change_map(const scene::MapChangeSpec& change) {
-  own_->environment = own_->environment.with_change(change);
+  scene::Environment& whole = own_->whole ? *own_->whole : own_->environment;
+  whole = whole.with_change(change);
+  if (own_->whole) return leave_out_allowed();
   own_->scratch = scene::Environment::Scratch(own_->environment, model_.shapes().size());
   current_ = false;
 }

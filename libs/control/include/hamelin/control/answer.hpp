@@ -11,6 +11,7 @@
 #include "hamelin/control/live_reference.hpp"
 #include "hamelin/control/live_target.hpp"
 #include "hamelin/planning/plugin_host.hpp"
+#include "hamelin/scene/allowance.hpp"
 
 namespace hamelin::control {
 
@@ -42,6 +43,9 @@ struct Answer {
   /// Number of the list of goals: 0 for the scene's, else what set_goals() returned.
   std::uint64_t goals_number = 0;
   std::size_t goal_index = 0;  ///< of the current goal in it; the number of goals after the last
+  /// What the current goal may touch, where that is anything; else null. No proof and no distance
+  /// regards it.
+  const scene::Allowance* may_touch = nullptr;
   /// The target of the current goal, where that is a follow goal; else null.
   const TargetState* target = nullptr;
   /// The reference of the current goal, where that has a trajectory; else null.

@@ -284,6 +284,7 @@ class Controller {
   void lose_measurement(double time_s, bool in_order);
   /// Stops an arm that cannot be seen, or does not do what it is sent.
   void check_arm();
+  [[nodiscard]] std::unique_ptr<GoalList> first_goals();
   void make_guidance();
   void take_goals();
   using ProvedMotions = std::vector<std::shared_ptr<const CertifiedPath>>;
@@ -296,6 +297,7 @@ class Controller {
   void expect_target(const std::vector<scene::Goal>& goals);
   template <class Sample>
   void receive_target(const Sample& sample);
+  void allow_for_goal();
   void update_target();
   void update_reference();
   /// The current goal as the planner sees it.

@@ -128,6 +128,7 @@ typedef struct hamelin_answer {
   double tip_position_m[3], tip_quaternion_wxyz[4];
   const double* series; /* the planner's own figures, hamelin_controller_series_name; or NaN */
   size_t series_count;
+  int32_t may_touch; /* 1: the current goal may touch something, which no proof regards */
 } hamelin_answer;
 
 enum {

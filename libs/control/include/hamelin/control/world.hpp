@@ -27,13 +27,18 @@ class Newest;
 /// The surroundings of an arm at some moment. Immutable once published; queries may run on any
 /// thread.
 struct WorldSnapshot {
-  std::uint64_t number = 0;  ///< counts the updates since the world was made
+  /// Grows with each update since the world was made; no two snapshots have the same.
+  std::uint64_t number = 0;
   scene::Environment environment;
   /// One per obstacle of the environment: a number that the obstacle keeps for its life and that no
   /// other obstacle of this world gets.
   std::vector<std::int32_t> obstacle_ids;
   /// The number of the last update that changed the map or an obstacle that stood still.
   std::uint64_t standing = 0;
+  /// What of the world may be touched and is left out here, see World::allow(); 0: nothing.
+  std::uint64_t allowance = 0;
+  /// The same world for each allowance.
+  std::vector<std::shared_ptr<const WorldSnapshot>> allowed;
 };
 
 /// The surroundings of an arm, which any thread may update while another one uses them. Each update
@@ -99,16 +104,25 @@ class World {
   /// @throws Error io, parse or invalid, also if there is no map
   std::uint64_t change_map(const scene::MapChangeSpec& change);
 
+  /// Makes snapshots tell, from the next one on, how the world is where something may be touched,
+  /// which costs as much as an update for each allowance. Those of the call before are kept for
+  /// goals that are still in force.
+  /// @return a number for each of them; 0 for one that is empty
+  /// @throws Error invalid for what check() refuses
+  std::vector<std::uint64_t> allow(const std::vector<scene::Allowance>& allowances);
+  /// @throws Error invalid, "may_touch: …", for an obstacle that does not exist
+  void require_obstacles(const scene::Allowance& allowance) const;
+
   /// Takes what a depth sensor saw into the map: points that were on the arm, its load or an
-  /// obstacle of the world are left out, rays to the others free the voxels that they pass, and the points occupy theirs,
-  /// docs/theory.md (20.1). What all frames since set_map() or change_map() told is kept; before
-  /// them, the map is as sure as scene::PointsSpec lets it be.
-  /// Bodies that move become obstacles, "mover SOURCE.ID", which later frames move.
-  /// Takes some 0.1 s for 320 × 240 points; other updates than those of the map need not wait.
+  /// obstacle of the world are left out, rays to the others free the voxels that they pass, and the
+  /// points occupy theirs, docs/theory.md (20.1). What all frames since set_map() or change_map()
+  /// told is kept; before them, the map is as sure as scene::PointsSpec lets it be. Bodies that
+  /// move become obstacles, "mover SOURCE.ID", which later frames move. Takes some 0.1 s for 320 ×
+  /// 240 points; other updates than those of the map need not wait.
   /// @throws Error invalid, "points: …", for a frame that check() refuses, if there is no map, for
   ///         a time that is after that of the last tick by more than 10 ms or before it by more
-  ///         than scene::PointsSpec::age_max_s, and for a sensor that is in an occupied voxel; nothing
-  ///         changes then
+  ///         than scene::PointsSpec::age_max_s, and for a sensor that is in an occupied voxel;
+  ///         nothing changes then
   FrameReport insert_points(const PointFrame& frame);
 
   /// Where the arm is, and with which load, see note_load(). For the thread of the control loop:
@@ -119,12 +133,18 @@ class World {
 
   /// The newest snapshot, for queries on any thread but that of the control loop: this locks, but
   /// never for longer than it takes to copy a pointer.
-  [[nodiscard]] std::shared_ptr<const WorldSnapshot> latest() const;
+  /// @param allowance returned by allow(): what it allows is left out. Those that the world has
+  ///        forgotten leave nothing out
+  [[nodiscard]] std::shared_ptr<const WorldSnapshot> latest(std::uint64_t allowance = 0) const;
 
   /// A snapshot with the working memory of queries on it.
   struct View {
     std::shared_ptr<const WorldSnapshot> snapshot;
     scene::Environment::Scratch scratch;
+    std::vector<View> allowed;  ///< one per snapshot->allowed
+
+    /// The view of what is left where an allowance holds; this one if it is 0 or not known.
+    [[nodiscard]] View& with(std::uint64_t allowance) noexcept;
   };
   /// The newest snapshot, valid until the next call. For the thread of the control loop: never
   /// waits, never allocates.
@@ -146,6 +166,21 @@ class World {
   enum class Changes { standing, moving };
   std::uint64_t publish(scene::Environment environment, std::vector<std::int32_t> ids,
                         Changes changes);
+  [[nodiscard]] View view_of(std::shared_ptr<const WorldSnapshot> snapshot) const;
+  /// What goals may touch, and the map without it.
+  struct Allowed {
+    std::uint64_t number;
+    std::uint64_t list;  ///< of the last call of allow() that asked for it
+    scene::Allowance allowance;
+    scene::Environment map;
+  };
+  /// The entry for an allowance, which is added if there is none.
+  [[nodiscard]] Allowed& allowed(std::vector<Allowed>& among, const scene::Allowance& allowance);
+  /// All of them in an environment with another map.
+  [[nodiscard]] std::vector<Allowed> allowed_in(const scene::Environment& environment) const;
+  [[nodiscard]] std::shared_ptr<const WorldSnapshot> snapshot_with(const Allowed& allowed,
+                                                                   const WorldSnapshot& all,
+                                                                   Changes changes);
   /// Publishes an environment with another map. The caller has locked map_mutex_.
   std::uint64_t publish_map(const scene::Environment& environment);
   /// Arms at the time of a frame, one for each posture that may be the one.
@@ -166,6 +201,7 @@ class World {
   const model::Model& model_;
   std::size_t contacts_max_ = 0;
   // The control loop takes none of these.
+  std::mutex allowed_mutex_;         ///< of `allows_`; taken before the others
   std::mutex map_mutex_;             ///< among writers of the map; taken before `mutex_`
   std::mutex mutex_;                 ///< among writers
   mutable std::mutex latest_mutex_;  ///< of `latest_`, which only writers change
@@ -173,6 +209,11 @@ class World {
   std::map<std::int32_t, MotionEstimator> streams_;  ///< of observed poses, by the obstacle's id
   /// Obstacles of the scene that are not known at first, with their indices in the scene.
   std::vector<std::pair<std::string, std::int32_t>> reserved_;
+  std::uint64_t last_number_ = 0;  ///< of a snapshot
+  /// Changed by who has locked both `map_mutex_` and `mutex_`.
+  std::vector<Allowed> allowed_;
+  bool allows_ = false;  ///< whether there are any
+  std::uint64_t allowed_lists_ = 0, last_allowance_ = 0;
   std::shared_ptr<const WorldSnapshot> latest_;
   std::unique_ptr<Newest<View>> newest_;
   std::unique_ptr<SensedMap> sensed_;  ///< none: nothing was seen since the map was set or changed

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -58,6 +59,14 @@ class WorldView {
   /// Takes the newest snapshot of the World; results of the last look() still belong to the one
   /// before. @return whether it is another one
   bool take_newest();
+  /// What may be touched from now on: it is no obstacle. With a World: what World::allow() gave the
+  /// number to; 0: nothing. Results of the last look() still belong to what was allowed before.
+  /// For the thread of look(). @return whether that changes what is seen
+  bool allow(std::uint64_t allowance);
+  /// The same without a World; allocates.
+  void allow(const scene::Allowance& allowance);
+  /// The number of what may be touched. Any thread.
+  [[nodiscard]] std::uint64_t allowance() const noexcept { return allowance_; }
   /// Updates contacts(), self_contacts(), clearances and poses() to the configuration q. Costs
   /// nothing if the last look was at the same configuration, time and snapshot.
   void look(const Eigen::VectorXd& q, double time_s);
@@ -76,10 +85,7 @@ class WorldView {
   /// Applies the changes of the map that are due. Results of the last look() still belong to the
   /// old map.
   /// @return one line that describes them; empty if none was due
-  [[nodiscard]] std::string advance_map() {
-    current_ = false;
-    return own_->environment.advance(time_s_);
-  }
+  [[nodiscard]] std::string advance_map();
 
   /// The near points that a planner is shown: shapes in order, nearest first within a shape.
   [[nodiscard]] std::span<const scene::Contact> contacts() const noexcept {
@@ -115,6 +121,8 @@ class WorldView {
   /// [m].
   [[nodiscard]] double clearance_m() const noexcept { return clearance_now_; }
   [[nodiscard]] double self_clearance_m() const noexcept { return self_clearance_now_; }
+  /// The same to all that there is at the last look(), including what may be touched.
+  [[nodiscard]] double whole_clearance_m() const;
   [[nodiscard]] bool touching() const noexcept {
     return (has_obstacles() && clearance_now_ <= 0.0) || (has_self() && self_clearance_now_ <= 0.0);
   }
@@ -161,7 +169,10 @@ class WorldView {
         : environment(std::move(of)), scratch(environment, shapes) {}
     scene::Environment environment;
     scene::Environment::Scratch scratch;
+    scene::Allowance allowance;
+    std::optional<scene::Environment> whole;  ///< with what may be touched, if anything
   };
+  void leave_out_allowed();
   WorldView(const scene::Scene& scene, const model::Model& model, double influence_m,
             std::optional<Own> own, World* world, std::size_t contacts_max);
   void see(World::View& view);
@@ -179,6 +190,8 @@ class WorldView {
   World* world_;                           ///< null without one
   std::optional<World::View> first_view_;  ///< of the world; kept, since ticks free no memory
   const scene::Environment* environment_ = nullptr;
+  const scene::Environment* whole_ = nullptr;  ///< with what may be touched
+  std::atomic<std::uint64_t> allowance_{0};
   scene::Environment::Scratch* scratch_ = nullptr;
   std::span<const std::int32_t> ids_;
   std::uint64_t snapshot_ = 0, standing_ = 0;

@@ -97,6 +97,15 @@ struct Result {
     long refused_lines = 0;              ///< of the stream
   };
   std::optional<Following> following;
+  /// What a goal may touch.
+  struct MayTouch {
+    std::size_t goal = 0;  ///< the first has number 1
+    Json what;             ///< as in the scene
+    /// Smallest distance from it and from all obstacles while the goal was the current one, at most
+    /// that up to which obstacles are found [m].
+    double clearance_m = 0.0;
+  };
+  std::vector<MayTouch> may_touch;
   /// How well the arm followed the trajectories of goals, tick by tick.
   struct Trajectory {
     double duration_s = 0.0;  ///< of those that were begun

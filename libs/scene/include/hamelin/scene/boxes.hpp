@@ -13,6 +13,7 @@ namespace hamelin::scene {
 /// Axis-aligned box [lo, hi] [m].
 struct Box {
   Eigen::Vector3d lo = Eigen::Vector3d::Zero(), hi = Eigen::Vector3d::Zero();
+  [[nodiscard]] bool operator==(const Box&) const = default;
 };
 
 /// Axis-aligned box [lo, hi), in voxels.

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "hamelin/geometry/se3.hpp"
+#include "hamelin/scene/allowance.hpp"
 #include "hamelin/scene/distance_field.hpp"
 #include "hamelin/scene/map_field.hpp"
 #include "hamelin/scene/map_region.hpp"
@@ -179,6 +180,9 @@ class Environment {
   /// The same for a change in voxels, of which those beyond map_ball() do not matter.
   /// @throws Error invalid if there is no map to change
   [[nodiscard]] Environment with_change(const MapChange& change) const;
+  /// A copy in which what may be touched is no obstacle: its voxels are free, and its obstacles
+  /// never exist, but keep their indices.
+  [[nodiscard]] Environment with_allowance(const Allowance& allowance) const;
   /// Computes now what the first query inside the map would compute, so that queries neither
   /// allocate nor wait.
   void prepare() const;

@@ -11,6 +11,7 @@
 #include "hamelin/geometry/se3.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/model/model.hpp"
+#include "hamelin/scene/allowance.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/joint_trajectory.hpp"
 #include "hamelin/scene/motion.hpp"
@@ -71,6 +72,7 @@ struct Goal {
   bool position_only = false;               ///< follow: whether the orientation is free
   std::optional<Motion> motion;             ///< follow: of the target; none: it is streamed
   TargetStream stream;                      ///< follow without a motion
+  Allowance may_touch;                      ///< while this goal is the current one
 };
 
 /// Goals with the tolerances that a scene file gets by default.
@@ -278,6 +280,8 @@ void set_pointer(Json& document, std::string_view assignment);
 [[nodiscard]] Obstacle obstacle_from_json(const Json& document, const std::string& where);
 /// @throws Error invalid for an ObservedMotion, which scenes do not have
 [[nodiscard]] Json to_json(const Obstacle& obstacle);
+/// In the format of a goal's may_touch; null if nothing may be touched.
+[[nodiscard]] Json to_json(const Allowance& allowance);
 /// @throws Error invalid for an ObservedMotion
 [[nodiscard]] Json motion_json(const Motion& motion);
 

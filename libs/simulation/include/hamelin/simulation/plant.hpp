@@ -54,6 +54,8 @@ class Plant {
   virtual void take_load() = 0;
   /// From this node on the map is another one. @throws Error as scene::Environment::with_change
   virtual void change_map(const scene::MapChangeSpec&) {}
+  /// What contacts() does not count from now on.
+  virtual void allow(const scene::Allowance&) {}
   /// Energy at the node.
   [[nodiscard]] virtual integration::Energy energy() = 0;
   [[nodiscard]] virtual Contacts contacts() const { return {}; }

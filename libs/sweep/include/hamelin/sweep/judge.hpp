@@ -149,7 +149,7 @@ class Judge {
  public:
   static constexpr double step_rad = 0.01;
 
-  /// @throws Error as JudgedArm and JudgedMap do
+  /// @throws Error as JudgedArm and JudgedMap do; invalid if goals may touch something
   explicit Judge(const scene::Scene& scene);
 
   /// Checks the motion from the previous node to this one: time [s] and joint vector [rad or m].

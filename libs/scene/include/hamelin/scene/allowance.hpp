@@ -1,0 +1,22 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "hamelin/scene/boxes.hpp"
+
+namespace hamelin::scene {
+
+/// What an arm may touch on the way to a goal: it is no obstacle then.
+struct Allowance {
+  std::vector<Box> boxes_m;  ///< in the map's frame: its voxels there, unknown ones included
+  std::vector<std::string> obstacles;  ///< by name
+
+  [[nodiscard]] bool operator==(const Allowance&) const = default;
+  [[nodiscard]] bool empty() const noexcept { return boxes_m.empty() && obstacles.empty(); }
+};
+
+/// @throws Error invalid, "where: what is wrong", for a box without volume or with numbers that are
+///         not finite, and an obstacle without a name
+void check(const Allowance& allowance, const std::string& where);
+
+}  // namespace hamelin::scene
