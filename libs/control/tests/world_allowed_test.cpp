@@ -1,4 +1,5 @@
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "hamelin/control/world.hpp"
 #include "hamelin/control/world_view.hpp"
@@ -20,7 +21,7 @@ scene::Scene scene_with_voxels() {
   return scene;
 }
 
-scene::Obstacle ball(const std::string& name, const Vector3d& at) {
+scene::Obstacle sphere_at(const std::string& name, const Vector3d& at) {
   scene::Obstacle out;
   out.name = name;
   out.radius_m = 0.1;
@@ -29,7 +30,7 @@ scene::Obstacle ball(const std::string& name, const Vector3d& at) {
 }
 
 // Distance of a point from the world with an allowance, at most 1 m.
-double distance(const control::World& world, const Vector3d& p, std::uint64_t allowance) {
+double distance_with(const control::World& world, const Vector3d& p, std::uint64_t allowance) {
   const double no_radius = 0.0;
   return world.latest(allowance)->environment.clearance({{&p, 1}, {&no_radius, 1}}, 0.0, 1.0);
 }
@@ -43,7 +44,7 @@ TEST_CASE("a world tells how it is without what may be touched, after each updat
   scene::MapChangeSpec wall;
   wall.occupied_m = {{{1.0, -1.0, -0.5}, {1.2, 1.0, 0.5}}};
   world.change_map(wall);
-  world.set_obstacle(ball("a", {0.0, 2.0, 0.0}));
+  world.set_obstacle(sphere_at("a", {0.0, 2.0, 0.0}));
   const scene::Allowance of_map{{{{1.0, -0.2, -0.2}, {1.2, 0.2, 0.2}}}, {}}, of_ball{{}, {"a"}};
   const auto ids = world.allow({of_map, {}, of_ball});
   REQUIRE(ids.size() == 3);
@@ -51,21 +52,21 @@ TEST_CASE("a world tells how it is without what may be touched, after each updat
   CHECK(ids[0] != ids[2]);
 
   const Vector3d in_wall(1.1, 0.0, 0.0), in_ball(0.0, 2.0, 0.0);
-  CHECK(distance(world, in_wall, 0) <= 0.0);
-  CHECK(distance(world, in_wall, ids[0]) == Approx(0.2));
-  CHECK(distance(world, in_wall, ids[2]) <= 0.0);
-  CHECK(distance(world, in_ball, ids[0]) == Approx(-0.1));
-  CHECK(distance(world, in_ball, ids[2]) > 0.9);
+  CHECK(distance_with(world, in_wall, 0) <= 0.0);
+  CHECK(distance_with(world, in_wall, ids[0]) == Approx(0.2));
+  CHECK(distance_with(world, in_wall, ids[2]) <= 0.0);
+  CHECK(distance_with(world, in_ball, ids[0]) == Approx(-0.1));
+  CHECK(distance_with(world, in_ball, ids[2]) > 0.9);
 
   SECTION("obstacles and maps that change later are known with each of them") {
-    world.set_obstacle(ball("b", {1.1, 0.0, 0.0}));
-    CHECK(distance(world, in_wall, ids[0]) == Approx(-0.1));
+    world.set_obstacle(sphere_at("b", {1.1, 0.0, 0.0}));
+    CHECK(distance_with(world, in_wall, ids[0]) == Approx(-0.1));
     world.remove_obstacle("b");
     scene::MapChangeSpec more;
     more.occupied_m = {{{1.0, -0.1, -0.1}, {1.2, 0.1, 0.1}}, {{0.0, 1.9, 0.0}, {0.1, 2.0, 0.1}}};
     world.change_map(more);
-    CHECK(distance(world, in_wall, ids[0]) == Approx(0.2));
-    CHECK(distance(world, {0.05, 1.95, 0.05}, ids[2]) <= 0.0);
+    CHECK(distance_with(world, in_wall, ids[0]) == Approx(0.2));
+    CHECK(distance_with(world, {0.05, 1.95, 0.05}, ids[2]) <= 0.0);
   }
   SECTION("numbers grow, and what stands still has another one if it changes") {
     const auto before = world.latest(), without = world.latest(ids[0]);
@@ -82,13 +83,13 @@ TEST_CASE("a world tells how it is without what may be touched, after each updat
   }
   SECTION("the same allowance keeps its number, and old ones are forgotten") {
     CHECK(world.allow({of_map})[0] == ids[0]);
-    CHECK(distance(world, in_ball, ids[2]) > 0.9);
+    CHECK(distance_with(world, in_ball, ids[2]) > 0.9);
     CHECK(world.allow({of_map})[0] == ids[0]);
-    CHECK(distance(world, in_ball, ids[2]) == Approx(-0.1));
+    CHECK(distance_with(world, in_ball, ids[2]) == Approx(-0.1));
     (void)world.allow({{}});
     (void)world.allow({{}});
     CHECK(world.latest()->allowed.empty());
-    CHECK(distance(world, in_wall, ids[0]) <= 0.0);
+    CHECK(distance_with(world, in_wall, ids[0]) <= 0.0);
   }
   SECTION("a view takes it with the next snapshot") {
     control::WorldView view(scene_with_voxels(), arm, world);

@@ -154,6 +154,18 @@ def test_lists_of_goals(scene):
     assert servos.move(1).goals_number == number
 
 
+def test_what_a_goal_may_touch(scene):
+    controller = hamelin.Controller(scene)
+    q, v = list(scene.start_q), np.zeros(7)
+    box = [0.6, 0.3, 0.2, 0.8, 0.5, 0.4]
+    controller.set_goals({"type": "joint", "q": q, "may_touch": {"boxes_m": [box]}})
+    assert controller.tick(0.0, q, v).may_touch
+    with pytest.raises(hamelin.Error, match="goal 1: may_touch: obstacle 'can': there is none"):
+        controller.set_goals({"type": "joint", "q": q, "may_touch": {"obstacles": ["can"]}})
+    controller.set_goals({"type": "joint", "q": q})
+    assert not controller.tick(0.001, q, v).may_touch
+
+
 def test_trajectories_and_targets_are_in_the_answer(scene):
     controller = hamelin.Controller(scene, position=True)
     q = list(scene.start_q)

@@ -38,10 +38,15 @@ TimedPath::Place TimedPath::project(const VectorXd& q_arm, const VectorXd& v_arm
   const double square = v.squaredNorm(), along = v.dot(q_arm) - v.dot(q),
                slope = square - a.dot(q_arm) + a.dot(q);
   if (square > least_speed * least_speed && slope > least_slope * square) {
-    out.time_s = std::clamp(out.time_s + std::clamp(along / slope, -largest_step_s, largest_step_s),
+    const double before_s = out.time_s;
+    out.time_s = std::clamp(before_s + std::clamp(along / slope, -largest_step_s, largest_step_s),
                             0.0, duration_s());
     at(out.time_s, q, v, a, cursor);
-    out.rate = v_arm.dot(v) / v.squaredNorm();
+    // near the ends of a path its direction is all that is known, and at them not even that
+    if (v.squaredNorm() > least_speed * least_speed)
+      out.rate = v_arm.dot(v) / v.squaredNorm();
+    else
+      at(out.time_s = before_s, q, v, a, cursor);
   }
   out.rate = std::clamp(out.rate, 0.0, 1.0);
   return out;

@@ -200,6 +200,18 @@ TEST_CASE("position, velocity and acceleration of a motion belong together", "[t
     CHECK(((behind.q - before.q) / (2.0 * h) - at.v).norm() < 1e-3);
     CHECK((behind.v - before.v).norm() < 2.0 * h * 10.0 * 2.0 * 1.01);
   }
+  // behind the start there is no direction, and the place stays
+  {
+    timing::TimedPath::Cursor cursor;
+    State near(4);
+    const State start = state_at(motion, 0.0), soon = state_at(motion, 0.03);
+    REQUIRE(soon.v.norm() > 0.2);
+    const auto place = motion.project(start.q - 0.5 * (soon.q - start.q), soon.v, {0.03, 0.7},
+                                      cursor, near.q, near.v, near.a);
+    CHECK(place.time_s == 0.03);
+    CHECK(place.rate == 0.7);
+    CHECK(near.q == soon.q);
+  }
   // back from a place to its time, and from a state to its place
   timing::TimedPath::Cursor cursor;
   State near(4);

@@ -221,6 +221,28 @@ TEST_CASE("in C, a list of goals replaces others, and the goals are reached in o
   CHECK(loop.answer.goals == 2);
 }
 
+TEST_CASE("in C, an answer says whether its goal may touch something", "[control][c][touch]") {
+  CLoop loop(c_document("hybrid"), by_position);
+  Json near = {{"type", "joint"}, {"q", loop.scene.start_q}};
+  near["q"][0] = 0.1;
+  const auto set_goal = [&] {
+    std::uint64_t number = 0;
+    return hamelin_controller_set_goals(loop.controller, near.dump().c_str(), nullptr, &number,
+                                        loop.error.data(), loop.error.size());
+  };
+  loop.move(1);
+  CHECK(loop.answer.may_touch == 0);
+  near["may_touch"] = {{"boxes_m", {{0.6, 0.3, 0.2, 0.8, 0.5, 0.4}}}};
+  loop.require(set_goal());
+  loop.move(1);
+  CHECK(loop.answer.may_touch == 1);
+  near["may_touch"] = {{"obstacles", {"nothing"}}};
+  CHECK_THAT(loop.failure(set_goal()),
+             Contains("goal 1: may_touch: obstacle 'nothing': there is none of this name"));
+  loop.move(1);
+  CHECK(loop.answer.may_touch == 1);
+}
+
 TEST_CASE("in C, files that goals name are searched for in a folder", "[control][c]") {
   CLoop loop(c_document("hybrid"));
   const test::TemporaryFolder other;

@@ -185,7 +185,8 @@ TEST_CASE("planners that follow no paths are shown their way-points", "[control]
     VectorXd q = scene.start_q;
     const auto update = [&](double time_s) {
       const auto news = guidance.update(
-          {time_s, 0.001, q, scene.goals.front(), follows ? 1U : 2U, 0, nullptr, nullptr}, search);
+          {time_s, 0.001, q, scene.goals.front(), follows ? 1U : 2U, 0, 0, nullptr, nullptr},
+          search);
       search.run();
       return news;
     };

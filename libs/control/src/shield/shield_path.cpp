@@ -74,6 +74,7 @@ bool Shield::verify_path(const Step& step) {
 
 bool Shield::within_tube(const Straying::Bounds& stray, Index first, Index last) {
   const CertifiedPath& path = *path_proof_.path();
+  if (!stray.tracking.allFinite()) return false;
   if (path.room.size() > 0)
     for (Index k = first; k <= last; ++k)
       for (Index j = 0; j < stray.tracking.size(); ++j)
