@@ -4,6 +4,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/scene/parts.hpp"
+#include "read_scene.hpp"
 
 namespace hamelin::scene {
 
@@ -14,7 +15,7 @@ Scene scene_with(const char* key, Json part, const std::filesystem::path& base_d
                  const std::string& where) {
   Json document{{"schema", "hamelin.scene/1"}, {"robot", {{"file", "none"}}}};
   document[key] = std::move(part);
-  return scene_from_json(document, base_dir, where);
+  return parts_from_json(document, base_dir, where);
 }
 
 void require_object(const Json& document, const std::string& where, const char* place) {

@@ -11,6 +11,7 @@
 #include "hamelin/core/text.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/scene/scene.hpp"
+#include "read_scene.hpp"
 #include "rotation.hpp"
 #include "waypoint_file.hpp"
 
@@ -684,6 +685,13 @@ Obstacle obstacle_from_json(const Json& document, const std::string& where) {
 
 Scene scene_from_json(const Json& document, const std::filesystem::path& base_dir,
                       const std::string& where) {
+  Scene scene = parts_from_json(document, base_dir, where);
+  check_named(Reader(document, where + ": "), scene);
+  return scene;
+}
+
+Scene parts_from_json(const Json& document, const std::filesystem::path& base_dir,
+                      const std::string& where) {
   check_shipped_schema(document, "scene", where);
   const Reader in(document, where + ": ");
   Scene scene;
@@ -720,7 +728,6 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
   scene.plant = read_plant(in, in.child("plant"), scene.actuation.type);
   scene.safety = read_safety(in.child("safety"));
   scene.events = read_events(in, base_dir, scene);
-  check_named(in, scene);
   return scene;
 }
 
