@@ -26,6 +26,12 @@ bool controller_sees_all(const scene::Scene& scene) {
                      [](const auto& goal) { return goal.may_touch.empty(); });
 }
 
+// What nobody has seen is no body that an arm could touch.
+scene::Scene with_nothing_in_unknown_space(scene::Scene scene) {
+  scene.map->unknown = scene::UnknownPolicy::free;
+  return scene;
+}
+
 void raise(std::optional<double>& most, double value) {
   most = std::max(most.value_or(0.0), value);
 }
@@ -43,7 +49,8 @@ Judge::Judge(const scene::Scene& scene, const model::Model& model, Plant& plant,
   if (controllers == nullptr)
     own_ = std::make_unique<control::WorldView>(scene, model, control::default_influence_m);
   else if (scene.map && !scene.map->known)
-    own_ = std::make_unique<control::WorldView>(scene, model, controllers->influence_m());
+    own_ = std::make_unique<control::WorldView>(with_nothing_in_unknown_space(scene), model,
+                                                controllers->influence_m());
   else if (!controller_sees_all(scene))
     own_ = std::make_unique<control::WorldView>(scene, model, *controllers);
   if (own_) view_ = own_.get();
