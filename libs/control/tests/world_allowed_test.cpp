@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "ball.hpp"
 #include "hamelin/control/world.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/core/error.hpp"
@@ -21,14 +22,6 @@ scene::Scene scene_with_voxels() {
   return scene;
 }
 
-scene::Obstacle sphere_at(const std::string& name, const Vector3d& at) {
-  scene::Obstacle out;
-  out.name = name;
-  out.radius_m = 0.1;
-  out.pose = {Eigen::Matrix3d::Identity(), at};
-  return out;
-}
-
 // Distance of a point from the world with an allowance, at most 1 m.
 double distance_with(const control::World& world, const Vector3d& p, std::uint64_t allowance) {
   const double no_radius = 0.0;
@@ -44,7 +37,7 @@ TEST_CASE("a world tells how it is without what may be touched, after each updat
   scene::MapChangeSpec wall;
   wall.occupied_m = {{{1.0, -1.0, -0.5}, {1.2, 1.0, 0.5}}};
   world.change_map(wall);
-  world.set_obstacle(sphere_at("a", {0.0, 2.0, 0.0}));
+  world.set_obstacle(test::ball("a", {0.0, 2.0, 0.0}));
   const scene::Allowance of_map{{{{1.0, -0.2, -0.2}, {1.2, 0.2, 0.2}}}, {}}, of_ball{{}, {"a"}};
   const auto ids = world.allow({of_map, {}, of_ball});
   REQUIRE(ids.size() == 3);
@@ -59,7 +52,7 @@ TEST_CASE("a world tells how it is without what may be touched, after each updat
   CHECK(distance_with(world, in_ball, ids[2]) > 0.9);
 
   SECTION("obstacles and maps that change later are known with each of them") {
-    world.set_obstacle(sphere_at("b", {1.1, 0.0, 0.0}));
+    world.set_obstacle(test::ball("b", {1.1, 0.0, 0.0}));
     CHECK(distance_with(world, in_wall, ids[0]) == Approx(-0.1));
     world.remove_obstacle("b");
     scene::MapChangeSpec more;

@@ -3,6 +3,7 @@
 #include <random>
 #include <thread>
 
+#include "ball.hpp"
 #include "hamelin/control/world.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/rng.hpp"
@@ -15,6 +16,7 @@ using namespace hamelin;
 using Catch::Contains;
 using Catch::Equals;
 using Eigen::Vector3d;
+using test::ball;
 
 namespace {
 
@@ -22,14 +24,6 @@ scene::Scene empty_scene() {
   scene::Scene scene;
   scene.name = "scene.json";
   return scene;
-}
-
-scene::Obstacle ball(const std::string& name, const Vector3d& at, double radius = 0.1) {
-  scene::Obstacle out;
-  out.name = name;
-  out.radius_m = radius;
-  out.pose = {Eigen::Matrix3d::Identity(), at};
-  return out;
 }
 
 control::Observation seen(double time_s, const Vector3d& at) {

@@ -119,9 +119,7 @@ class MujocoPlant final : public simulation::Plant {
                        describe_shape(link_first ? deepest->geom2 : deepest->geom1));
   }
 
-  void allow(const scene::Allowance& allowance) override {
-    if (!(allowance == allowance_)) allowance_ = allowance;
-  }
+  void allow(const scene::Allowance& allowance) override { allowance_ = allowance; }
 
  private:
   [[nodiscard]] bool is_allowed(const mjContact& contact) const {

@@ -210,7 +210,7 @@ std::vector<std::string> Judge::describe_goals_in_contact() {
           fmt::format("goal {}: the arm touches itself: {} are {:.2g} mm inside each other", i + 1,
                       view_->self_field()->describe(worst.pair), -1e3 * worst.distance));
   }
-  if (own_) own_->allow(scene_.goals.front().may_touch);
+  if (own_) own_->allow(may_touch_);
   return out;
 }
 
