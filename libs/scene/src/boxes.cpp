@@ -77,10 +77,10 @@ std::int32_t first_of_tile(std::int32_t voxel) {
   return (voxel + (1 << 20)) / tile * tile - (1 << 20);
 }
 
-// Bits of one tile, x running fastest.
+// Bits of one tile, or of its first layers along z, x running fastest.
 class BitGrid {
  public:
-  BitGrid() : words_(std::size_t{tile} * tile * words_per_row) {}
+  explicit BitGrid(std::size_t layers = tile) : words_(layers * tile * words_per_row) {}
 
   void set_row(std::int32_t x0, std::int32_t x1, std::int32_t y, std::int32_t z) {
     each_word(x0, x1, y, z, [](std::uint64_t& word, std::uint64_t bits) {
@@ -508,7 +508,7 @@ void uncovered(const std::vector<Flat>& of, const std::vector<Flat>& covers, Bit
 
 std::vector<VoxelBox> surface(const std::vector<VoxelBox>& boxes) {
   std::vector<VoxelBox> faces;
-  BitGrid grid;
+  BitGrid grid(1);
   std::vector<Flat> bare;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;

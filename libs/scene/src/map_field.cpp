@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "hamelin/core/numbers.hpp"
+#include "map_surface.hpp"
 
 namespace hamelin::scene {
 
@@ -23,21 +24,21 @@ std::vector<Box> in_metres(const std::vector<VoxelBox>& voxels, double resolutio
 
 MapField::MapField(const std::vector<Cell>& cells, double resolution, const Eigen::Vector3d& origin)
     : resolution_(resolution),
-      origin_(origin),
       boxes_(in_metres(merge(cells), resolution), origin),
-      surface_(std::make_unique<Surface>()) {}
+      surface_(std::make_unique<MapSurface>(resolution)) {}
 
 MapField::MapField(const MapField& other)
     : resolution_(other.resolution_),
-      origin_(other.origin_),
       boxes_(other.boxes_),
-      surface_(std::make_unique<Surface>()) {}
+      surface_(std::make_unique<MapSurface>(other.resolution_)) {}
 
-std::vector<VoxelBox> MapField::voxel_boxes(std::size_t from) const {
-  std::vector<VoxelBox> voxels;
-  for (std::size_t i = from; i < boxes_.boxes().size(); ++i)
-    if (boxes_.alive(i)) voxels.push_back(to_voxels(boxes_.boxes()[i], resolution_));
-  return voxels;
+MapField::MapField() = default;
+MapField::MapField(MapField&&) noexcept = default;
+MapField& MapField::operator=(MapField&&) noexcept = default;
+MapField::~MapField() = default;
+
+void MapField::prepare() const {
+  if (!empty()) surface_->prepare(boxes_);
 }
 
 MapField::Changed MapField::change(const std::vector<VoxelBox>& add,
@@ -94,34 +95,25 @@ MapField::Changed MapField::change(const std::vector<VoxelBox>& add,
   cut.erase(std::lower_bound(cut.begin(), cut.end(), static_cast<std::int32_t>(first_added)),
             cut.end());
   boxes_.change(cut, in_metres(added, resolution_));
-  surface_ = std::make_unique<Surface>();
+  surface_ = std::make_unique<MapSurface>(resolution_);
   return changed;
-}
-
-const BoxField& MapField::faces() const {
-  std::call_once(surface_->made, [this] {
-    surface_->faces = BoxField(in_metres(surface(voxel_boxes(0)), resolution_), origin_);
-  });
-  return surface_->faces;
 }
 
 // docs/theory.md (11.5)
 void MapField::find_exit(const Eigen::Vector3d& p, BoxHit& hit) const {
-  BoxHit face;
-  if (!faces().nearest(p, infinity, face)) return;
-  const double depth = std::abs(face.distance);
-  hit.distance = -depth;
-  hit.point = face.point;
-  hit.direction = -face.direction;
+  const MapSurface::Nearest nearest = surface_->nearest(boxes_, p);
+  if (nearest.distance == infinity) return;
+  hit.distance = -nearest.distance;
+  hit.point = nearest.point;
+  hit.direction = -nearest.direction;
   constexpr double on_surface = 1e-9;
-  if (depth > on_surface) return;
+  if (nearest.distance > on_surface) return;
   // the normal of the rectangle, towards the side that is not in the union half a voxel farther on
-  const Box& flat = faces().boxes()[static_cast<std::size_t>(face.box)];
   int axis = 0;
-  (flat.hi - flat.lo).minCoeff(&axis);
+  (nearest.face.hi - nearest.face.lo).minCoeff(&axis);
   const Eigen::Vector3d normal = Eigen::Vector3d::Unit(axis);
   BoxHit beyond;
-  const bool up = !boxes_.nearest(face.point + 0.5 * resolution_ * normal, 0.0, beyond);
+  const bool up = !boxes_.nearest(nearest.point + 0.5 * resolution_ * normal, 0.0, beyond);
   hit.direction = up ? normal : Eigen::Vector3d(-normal);
 }
 
@@ -131,7 +123,7 @@ void MapField::find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
   // greatest bound is divided where its chords cross.
   struct Sample {
     double t, depth;
-    std::int32_t face;
+    Box face;
   };
   struct Interval {
     Sample left, right;
@@ -142,15 +134,15 @@ void MapField::find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
   constexpr std::size_t intervals_max = 64;
   const auto at = [&](double t) { return Eigen::Vector3d(a + t * (b - a)); };
   const auto sample = [&](double t) {
-    BoxHit face, inside;
-    (void)faces().nearest(at(t), infinity, face);
-    const double distance = std::abs(face.distance);
-    return Sample{t, boxes_.nearest(at(t), 0.0, inside) ? distance : -distance, face.box};
+    BoxHit inside;
+    const MapSurface::Nearest nearest = surface_->nearest(boxes_, at(t));
+    const double depth =
+        boxes_.nearest(at(t), 0.0, inside) ? nearest.distance : -nearest.distance;
+    return Sample{t, depth, nearest.face};
   };
   const auto interval = [&](const Sample& left, const Sample& right) {
     const auto distance = [&](const Sample& of, const Sample& to) {
-      return std::abs(
-          closest_on_box(at(to.t), faces().boxes()[static_cast<std::size_t>(of.face)]).distance);
+      return std::abs(closest_on_box(at(to.t), of.face).distance);
     };
     const double a0 = std::abs(left.depth), a1 = distance(left, right), b0 = distance(right, left),
                  b1 = std::abs(right.depth);

@@ -171,7 +171,10 @@ scene::Environment World::make_environment(const std::optional<scene::MapSpec>& 
   if (scene.map) scene.map->changes.clear();
   if (scene.map && !scene.map->known) hide(*scene.map);
   scene.start_q = q;
-  return scene::make_environment(scene, model_, options_.influence_m + options_.payload_reach_m);
+  scene::Environment made =
+      scene::make_environment(scene, model_, options_.influence_m + options_.payload_reach_m);
+  if (options_.prepare) made.prepare();
+  return made;
 }
 
 std::size_t World::shapes_max() const noexcept {
@@ -192,7 +195,6 @@ World::View World::view_of(std::shared_ptr<const WorldSnapshot> snapshot) const 
 
 std::uint64_t World::publish(scene::Environment environment, std::vector<std::int32_t> ids,
                              Changes changes) {
-  if (options_.prepare) environment.prepare();
   const std::uint64_t number = latest_ ? ++last_number_ : 0;
   auto fresh = std::make_shared<WorldSnapshot>();
   fresh->number = number;
@@ -336,8 +338,13 @@ std::uint64_t World::change_map(const scene::MapChangeSpec& change) {
   return publish_map(environment);
 }
 
+// What sensors see changes with each frame: a query inside computes what it needs of it.
+bool World::prepares_maps() const {
+  return options_.prepare && !sensed_;
+}
+
 std::uint64_t World::publish_map(const scene::Environment& environment) {
-  if (options_.prepare) environment.prepare();
+  if (prepares_maps()) environment.prepare();
   std::vector<Allowed> allowed = allowed_in(environment);
   const std::lock_guard lock(mutex_);
   allowed_ = std::move(allowed);

@@ -27,7 +27,7 @@ World::Allowed& World::allowed(std::vector<Allowed>& among, const scene::Allowan
   });
   if (known != among.end()) return *known;
   scene::Environment map = latest()->environment.with_allowance(of_map(allowance));
-  if (options_.prepare) map.prepare();
+  if (prepares_maps()) map.prepare();
   return among.emplace_back(Allowed{++last_allowance_, 0, allowance, std::move(map)});
 }
 
@@ -59,7 +59,7 @@ std::vector<World::Allowed> World::allowed_in(const scene::Environment& environm
   std::vector<Allowed> out = allowed_;
   for (Allowed& entry : out) {
     entry.map = environment.with_allowance(of_map(entry.allowance));
-    if (options_.prepare) entry.map.prepare();
+    if (prepares_maps()) entry.map.prepare();
   }
   return out;
 }

@@ -50,8 +50,9 @@ class World {
   struct Options {
     double influence_m = 0.2;        ///< the largest distance at which obstacles are found
     std::size_t obstacles_max = 64;  ///< the largest number of obstacles at a time
-    /// Compute with each update what a query inside the map would compute first, so that no tick
-    /// ever allocates or waits.
+    /// Compute with each update what queries inside the map would compute first, so that no tick
+    /// ever allocates or waits; but with those of insert_points(), after which a tick with the arm
+    /// inside what was seen computes what is about it.
     bool prepare = true;
     ObservationOptions observations{};  ///< of the poses that observe_obstacle() is given
     /// How far beyond the tip payloads extend [m], and how many shapes they have.
@@ -183,6 +184,7 @@ class World {
                                                                    Changes changes);
   /// Publishes an environment with another map. The caller has locked map_mutex_.
   std::uint64_t publish_map(const scene::Environment& environment);
+  [[nodiscard]] bool prepares_maps() const;
   /// Arms at the time of a frame, one for each posture that may be the one.
   struct SeenArm;
   [[nodiscard]] SeenArm arm_seen_by(const PointFrame& frame, const scene::PointsSpec& spec) const;

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <vector>
 
@@ -11,6 +10,8 @@
 #include "hamelin/scene/map_file.hpp"
 
 namespace hamelin::scene {
+
+class MapSurface;
 
 /// Signed distances to the union of one kind of a map's cells (occupied or unknown), in the map's
 /// frame [m], by merged boxes in a tree.
@@ -23,7 +24,7 @@ class MapField {
   /// the same obstacle.
   static constexpr std::size_t points_max = 3;
 
-  MapField() = default;
+  MapField();
   /// @param cells disjoint, in voxels
   /// @param resolution edge of a voxel [m]
   /// @param origin a point near the expected queries
@@ -31,10 +32,10 @@ class MapField {
   /// A copy can be changed while queries run on the original. It computes its surface when that is
   /// first needed.
   MapField(const MapField& other);
-  MapField(MapField&&) noexcept = default;
+  MapField(MapField&&) noexcept;
   MapField& operator=(const MapField&) = delete;
-  MapField& operator=(MapField&&) noexcept = default;
-  ~MapField() = default;
+  MapField& operator=(MapField&&) noexcept;
+  ~MapField();
 
   [[nodiscard]] bool empty() const noexcept { return boxes_.empty(); }
   /// The merged boxes, disjoint, with the union of the cells. Some may have been removed, see
@@ -62,7 +63,7 @@ class MapField {
   /// The nearest point of the surface, seen from p and no farther than `limit`. @param hint see
   /// BoxField::nearest
   /// @return whether there is one; `hit` is unchanged if not. No allocation, except at the first
-  ///        query inside.
+  ///        query inside within some voxels.
   [[nodiscard]] bool nearest(const Eigen::Vector3d& p, double limit, BoxHit& hit,
                              std::int32_t hint = -1) const;
   /// The same, seen from a capsule's axis, the segment from a to b. If the axis enters the union,
@@ -88,30 +89,20 @@ class MapField {
                                Scratch& scratch, std::span<SegmentHit, points_max> out,
                                BoxField::Vicinity* vicinity = nullptr) const;
 
-  /// Computes now what the first query inside would compute, so that no query allocates or waits.
-  void prepare() const {
-    if (!empty()) (void)faces();
-  }
+  /// Computes now what the first queries inside would compute, so that no query allocates or waits.
+  void prepare() const;
 
   /// Memory in use.
   [[nodiscard]] std::size_t bytes() const noexcept { return boxes_.bytes(); }
 
  private:
-  /// The union's surface, computed at the first query inside.
-  struct Surface {
-    std::once_flag made;
-    BoxField faces;
-  };
-  [[nodiscard]] const BoxField& faces() const;
   /// Distance and exit direction of a point in the union or on its surface.
   void find_exit(const Eigen::Vector3d& p, BoxHit& hit) const;
   void find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, SegmentHit& hit) const;
-  [[nodiscard]] std::vector<VoxelBox> voxel_boxes(std::size_t from) const;
 
   double resolution_ = 0.0;
-  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   BoxField boxes_;
-  std::unique_ptr<Surface> surface_;
+  std::unique_ptr<MapSurface> surface_;
 };
 
 }  // namespace hamelin::scene
