@@ -5,17 +5,16 @@
 #include <utility>
 #include <vector>
 
-#include "hamelin/core/numbers.hpp"
 #include "voxel_boxes.hpp"
 
 namespace hamelin::scene {
 
 namespace {
 
-// Tiles are as small, and there are along no axis more.
+// The smallest edge of a tile [voxels], and the largest number of tiles along an axis.
 constexpr std::int32_t edge_min = 32, count_max = 16;
 
-// What is in common of a rectangle and a box may have no area.
+// What a rectangle and a box have in common may have no area.
 bool is_rectangle(const VoxelBox& face) {
   int flat = 0;
   for (std::size_t i = 0; i < 3; ++i) {

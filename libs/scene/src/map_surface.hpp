@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/scene/distance.hpp"
 
 namespace hamelin::scene {

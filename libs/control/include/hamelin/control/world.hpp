@@ -51,8 +51,8 @@ class World {
     double influence_m = 0.2;        ///< the largest distance at which obstacles are found
     std::size_t obstacles_max = 64;  ///< the largest number of obstacles at a time
     /// Compute with each update what queries inside the map would compute first, so that no tick
-    /// ever allocates or waits; but with those of insert_points(), after which a tick with the arm
-    /// inside what was seen computes what is about it.
+    /// ever allocates or waits. Updates by insert_points() are the exception: a tick in which the
+    /// arm is inside what was seen computes the surface near it.
     bool prepare = true;
     ObservationOptions observations{};  ///< of the poses that observe_obstacle() is given
     /// How far beyond the tip payloads extend [m], and how many shapes they have.
