@@ -1,6 +1,7 @@
 // Prints how long ticks of the planner hybrid take at 1 kHz, without points and while another
-// thread inserts 30 frames of 320 × 240 points per second into a map with voxels of 1 cm; and how
-// long it takes from when a frame is there until the first tick that knows it.
+// thread inserts 30 frames of 320 × 240 points per second into a map with voxels of 1 cm, or frames
+// that are refused; and how long it takes from when a frame is there until the first tick that
+// knows it.
 //
 //     hamelin_seeing_table [SECONDS]
 #include <fmt/format.h>
@@ -10,11 +11,13 @@
 #include <chrono>
 #include <cstdlib>
 #include <exception>
-#include <mutex>
+#include <limits>
+#include <string>
 #include <thread>
 
 #include "hamelin/control/controller.hpp"
 #include "hamelin/control/preparation.hpp"
+#include "hamelin/core/error.hpp"
 #include "hamelin/sensing/depth_camera.hpp"
 
 namespace {
@@ -28,7 +31,7 @@ double ms_since(Clock::time_point from) {
   return std::chrono::duration<double, std::milli>(Clock::now() - from).count();
 }
 
-void print(const char* what, std::vector<double> ms) {
+void print(const std::string& what, std::vector<double> ms) {
   std::sort(ms.begin(), ms.end());
   const auto at = [&](double share) {
     return ms[static_cast<std::size_t>(share * static_cast<double>(ms.size() - 1))];
@@ -50,10 +53,9 @@ sensing::DepthRenderer::Solid wall(const Eigen::Vector3d& size, const Eigen::Vec
 std::vector<control::PointFrame> frames_of(const scene::Scene& scene, const model::Model& arm) {
   sensing::DepthRenderer renderer({.fov_rad = 1.2, .noise_m = 0.002});
   renderer.set_map(scene::make_environment(scene, arm, control::default_influence_m));
-  const std::vector<sensing::DepthRenderer::Solid> room{wall({6.0, 6.0, 0.1}, {0.0, 0.0, -0.053}),
-                                                        wall({0.1, 6.0, 3.0}, {1.517, 0.0, 1.5}),
-                                                        wall({6.0, 0.1, 3.0}, {0.0, 1.513, 1.5}),
-                                                        wall({6.0, 0.1, 3.0}, {0.0, -1.516, 1.5})};
+  const std::vector<sensing::DepthRenderer::Solid> room{
+      wall({6.0, 6.0, 0.1}, {0.0, 0.0, -0.053}), wall({0.1, 6.0, 3.0}, {1.517, 0.0, 1.5}),
+      wall({6.0, 0.1, 3.0}, {0.0, 1.513, 1.5}), wall({6.0, 0.1, 3.0}, {0.0, -1.516, 1.5})};
   Rng rng(1);
   std::vector<control::PointFrame> frames(10);
   for (control::PointFrame& frame : frames) {
@@ -66,12 +68,30 @@ std::vector<control::PointFrame> frames_of(const scene::Scene& scene, const mode
   return frames;
 }
 
+// Points that are not finite or too many, no points, times that are not known yet or no longer.
+std::vector<control::PointFrame> bad_frames(const control::PointFrame& good) {
+  std::vector<control::PointFrame> out(5, good);
+  out[0].points(0, 1000) = std::numeric_limits<float>::quiet_NaN();
+  out[1].points.resize(3, 0);
+  out[2].time_s = 1.0;
+  out[3].time_s = -1.0;
+  out[4].points.setZero(3, 10'000'000);
+  return out;
+}
+
+enum class Sees { nothing, frames, refused_frames };
+
+std::string name_of(Sees sees) {
+  if (sees == Sees::nothing) return "no frames";
+  return sees == Sees::frames ? "frames" : "refused frames";
+}
+
 struct Seen {
   Clock::time_point there;
   std::uint64_t snapshot;
 };
 
-// Inserts frames at their rate until it is told to end.
+// Inserts frames at their rate until it is told to end; their times are relative to the clock.
 class Camera {
  public:
   Camera(control::World& world, std::vector<control::PointFrame> frames,
@@ -87,17 +107,26 @@ class Camera {
 
  private:
   void run() {
+    std::vector<double> later_s;
+    for (const control::PointFrame& frame : frames_) later_s.push_back(frame.time_s);
     auto next = Clock::now();
     for (std::size_t k = 0; !stop_; ++k) {
       control::PointFrame& frame = frames_[k % frames_.size()];
-      frame.time_s = now_s_;
-      const auto there = Clock::now();
-      const control::FrameReport report = world_.insert_points(frame);
-      insert_ms_.push_back(ms_since(there));
-      seen_.push_back({there, report.snapshot});
+      frame.time_s = now_s_ + later_s[k % frames_.size()];
+      insert(frame);
       next += std::chrono::microseconds(static_cast<long>(1e6 / frames_per_s));
       std::this_thread::sleep_until(next);
     }
+  }
+
+  void insert(const control::PointFrame& frame) {
+    const auto there = Clock::now();
+    try {
+      const control::FrameReport report = world_.insert_points(frame);
+      seen_.push_back({there, report.snapshot});
+    } catch (const Error&) {
+    }
+    insert_ms_.push_back(ms_since(there));
   }
 
   control::World& world_;
@@ -109,7 +138,14 @@ class Camera {
   std::thread thread_;
 };
 
-void measure(const scene::Scene& scene, double seconds, bool sees) {
+void check_refused(const Camera& camera) {
+  if (!camera.seen().empty())
+    throw Error(ErrorCode::invalid,
+                fmt::format("{} bad frames were not refused", camera.seen().size()));
+  print("refusal [ms]", camera.insert_ms());
+}
+
+void measure(const scene::Scene& scene, double seconds, Sees sees) {
   control::Controller::Options options;
   options.position = true;
   control::Controller controller(scene, {HAMELIN_TEST_PLUGIN_DIR}, options);
@@ -121,11 +157,12 @@ void measure(const scene::Scene& scene, double seconds, bool sees) {
   std::vector<double> tick_ms;
   std::vector<std::pair<Clock::time_point, std::uint64_t>> ticks;  // when each snapshot was known
   Eigen::VectorXd q = scene.start_q, v = Eigen::VectorXd::Zero(q.size());
-  // as much is in the map in both cases
+  // as much is in the map in all cases
   for (const control::PointFrame& frame : frames) (void)controller.world().insert_points(frame);
   (void)controller.tick(0.0, q, v);
   std::optional<Camera> camera;
-  if (sees) camera.emplace(controller.world(), std::move(frames), now_s);
+  if (sees == Sees::refused_frames) frames = bad_frames(frames[0]);
+  if (sees != Sees::nothing) camera.emplace(controller.world(), std::move(frames), now_s);
   auto next = Clock::now();
   for (long k = 1; static_cast<double>(k) * period_s < seconds; ++k) {
     next += std::chrono::microseconds(1000);
@@ -140,9 +177,10 @@ void measure(const scene::Scene& scene, double seconds, bool sees) {
     v = answer.v_next;
     if (answer.state == control::ControlState::reached) controller.set_goals(scene.goals);
   }
-  print(sees ? "tick with frames [ms]" : "tick without frames [ms]", tick_ms);
+  print(fmt::format("tick with {} [ms]", name_of(sees)), tick_ms);
   if (!camera) return;
   camera->join();
+  if (sees == Sees::refused_frames) return check_refused(*camera);
   std::vector<double> delay_ms;
   for (const Seen& seen : camera->seen()) {
     const auto known = std::find_if(ticks.begin(), ticks.end(),
@@ -160,7 +198,8 @@ void print_table(double seconds) {
       scene::read_scene(std::string(HAMELIN_SOURCE_DIR) + "/data/scenes/shelf.json");
   scene.map->file = std::string(HAMELIN_SOURCE_DIR) + "/data/maps/shelf.bt";
   fmt::print("{:<32}{:>8}{:>10}{:>10}{:>10}\n", "", "count", "p50", "p99", "max");
-  for (const bool sees : {false, true}) measure(scene, seconds, sees);
+  for (const Sees sees : {Sees::nothing, Sees::frames, Sees::refused_frames})
+    measure(scene, seconds, sees);
 }
 
 }  // namespace

@@ -96,6 +96,11 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
                          : fmt::format("; {:.2f} % of the steps proved clear, the tightest by {} m",
                                        100.0 * r["certified_share"].get<double>(),
                                        number(r["tightest_step_m"]))));
+  if (r.contains("may_touch"))
+    for (const Json& allowed : r["may_touch"])
+      line("may touch",
+           fmt::format("at goal {}, {} m from it at least", allowed["goal"].get<std::size_t>(),
+                       number(allowed["clearance_m"])));
   if (r.contains("torque_change"))
     line("torque",
          fmt::format("changes by {} Nm from tick to tick on the mean, by {} Nm at most",

@@ -90,13 +90,10 @@ std::optional<Json> Scenery::map(std::uint64_t time_ns, double time_s) {
   if (!map_changed_) return std::nullopt;
   map_changed_ = false;
   Entity entity(time_ns, map_frame, map_frame);
-  const scene::BoxField& field = environment_.map_field().boxes();
-  for (std::size_t i = 0; i < field.boxes().size(); ++i) {
-    if (!field.alive(i)) continue;
-    const scene::Box& box = field.boxes()[i];
+  environment_.map_field().boxes().for_each_alive([&](const scene::Box& box) {
     entity.add_box({Eigen::Matrix3d::Identity(), 0.5 * (box.lo + box.hi)}, box.hi - box.lo,
                    map_color);
-  }
+  });
   return scene_update(time_ns, {entity});
 }
 

@@ -127,15 +127,11 @@ class MujocoPlant final : public simulation::Plant {
     for (const int geom : {contact.geom1, contact.geom2}) {
       const ShapeId id = shape(geom);
       if (id.kind == Kind::obstacle &&
-          allows(environment_.obstacles()[static_cast<std::size_t>(id.index)].name))
+          allowance_.names(environment_.obstacles()[static_cast<std::size_t>(id.index)].name))
         return true;
       if (id.kind == Kind::map && allows(Eigen::Vector3d::Map(contact.pos))) return true;
     }
     return false;
-  }
-  [[nodiscard]] bool allows(const std::string& obstacle) const {
-    const auto& names = allowance_.obstacles;
-    return std::find(names.begin(), names.end(), obstacle) != names.end();
   }
   // A voxel that a box touches is allowed as a whole.
   [[nodiscard]] bool allows(const Eigen::Vector3d& world) const {

@@ -264,9 +264,8 @@ py::array_t<SelfContactRow> self_contacts(const BoundEnvironment& e, py::handle 
 
 py::tuple boxes(const BoundEnvironment& e) {
   std::vector<scene::Box> alive;
-  const auto& field = e.environment.map_field().boxes();
-  for (std::size_t i = 0; i < field.boxes().size(); ++i)
-    if (field.alive(i)) alive.push_back(field.boxes()[i]);
+  e.environment.map_field().boxes().for_each_alive(
+      [&](const scene::Box& box) { alive.push_back(box); });
   const auto count = static_cast<py::ssize_t>(alive.size());
   auto low = new_array({count, 3}), high = new_array({count, 3});
   for (py::ssize_t i = 0; i < count; ++i) {

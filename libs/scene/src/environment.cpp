@@ -130,8 +130,7 @@ Environment Environment::with_allowance(const Allowance& allowance) const {
     copy = with_change(change);
   }
   for (std::size_t k = 0; k < obstacles_.size(); ++k) {
-    const auto& names = allowance.obstacles;
-    if (std::find(names.begin(), names.end(), obstacles_[k].name) == names.end()) continue;
+    if (!allowance.names(obstacles_[k].name)) continue;
     copy.obstacles_[k].appears_s = std::numeric_limits<double>::infinity();
     copy.moves_[k] = 0;
   }
@@ -161,8 +160,8 @@ std::shared_ptr<const DistanceField> Environment::distance_field() const {
   std::call_once(field_->once, [this] {
     std::vector<VoxelBox> voxels;
     const auto add = [&](const BoxField& boxes) {
-      for (std::size_t i = 0; i < boxes.boxes().size(); ++i)
-        if (boxes.alive(i)) voxels.push_back(to_voxels(boxes.boxes()[i], summary_.resolution_m));
+      boxes.for_each_alive(
+          [&](const Box& box) { voxels.push_back(to_voxels(box, summary_.resolution_m)); });
     };
     add(map_->boxes());
     if (summary_.unknown == UnknownPolicy::block) add(unknown_->boxes());

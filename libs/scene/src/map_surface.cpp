@@ -27,8 +27,8 @@ bool is_rectangle(const VoxelBox& face) {
 }  // namespace
 
 void MapSurface::divide(const BoxField& boxes) {
-  for (std::size_t i = 0; i < boxes.boxes().size(); ++i)
-    if (boxes.alive(i)) extent_ = hull(extent_, to_voxels(boxes.boxes()[i], resolution_));
+  boxes.for_each_alive(
+      [&](const Box& box) { extent_ = hull(extent_, to_voxels(box, resolution_)); });
   edge_ = edge_min;
   for (std::size_t i = 0; i < 3; ++i)
     edge_ = std::max(edge_, (extent_.hi[i] - extent_.lo[i] + count_max - 1) / count_max);

@@ -134,6 +134,28 @@ TEST_CASE(
   CHECK(inside > 0);
 }
 
+TEST_CASE("the surface of a large map is found from inside, also where its nearest part is far",
+          "[scene][unit]") {
+  // A block of 900 × 40 × 40 voxels with a shaft, and a lone voxel far from it.
+  const VoxelBox block_voxels{{-10, 0, 0}, {890, 40, 40}},
+      shaft_voxels{{400, 19, 3}, {401, 20, 40}};
+  const Box block = to_metres(block_voxels, voxel_m), shaft = to_metres(shaft_voxels, voxel_m);
+  MapField field({{{0, 0, 2000}, 1}}, voxel_m, Vector3d::Zero());
+  field.change({block_voxels}, {});
+  field.change({}, {shaft_voxels});
+  Rng rng(3);
+  for (int i = 0; i < 300; ++i) {
+    const Vector3d share{rng.uniform(), rng.uniform(), rng.uniform()};
+    const Vector3d p = block.lo + share.cwiseProduct(block.hi - block.lo);
+    const double to_shaft = (shaft.lo - p).cwiseMax(p - shaft.hi).cwiseMax(0.0).norm();
+    if (to_shaft == 0.0) continue;
+    const double depth = std::min({to_shaft, (p - block.lo).minCoeff(), (block.hi - p).minCoeff()});
+    BoxHit hit;
+    REQUIRE(field.nearest(p, infinity, hit));
+    CHECK(hit.distance == Approx(-depth).margin(1e-12));
+  }
+}
+
 TEST_CASE("on the surface the direction is the normal that leads out", "[scene][unit]") {
   // two boxes that cannot be one: an L
   const std::vector<Cell> cells{{{0, 0, 0}, 2}, {{2, 0, 0}, 1}};

@@ -153,9 +153,9 @@ struct Changes {
     std::vector<scene::VoxelBox> voxels;
     const double resolution_m = environment.summary().resolution_m;
     for (const auto* part : {&environment.map_field(), &environment.unknown_field()})
-      for (std::size_t i = 0; i < part->boxes().boxes().size(); ++i)
-        if (part->boxes().alive(i))
-          voxels.push_back(scene::to_voxels(part->boxes().boxes()[i], resolution_m));
+      part->boxes().for_each_alive([&](const scene::Box& box) {
+        voxels.push_back(scene::to_voxels(box, resolution_m));
+      });
     const auto fresh = scene::DistanceField::make(voxels, resolution_m);
     const auto kept = environment.distance_field();
     if (!fresh || !kept) return !fresh && !kept;

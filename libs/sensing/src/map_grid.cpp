@@ -24,8 +24,8 @@ scene::VoxelBox box_around(const scene::Ball& ball, double resolution) {
 }
 
 void set_all(OccupancyGrid& grid, const scene::BoxField& boxes, OccupancyGrid::State state) {
-  for (std::size_t i = 0; i < boxes.boxes().size(); ++i)
-    if (boxes.alive(i)) grid.set(scene::to_voxels(boxes.boxes()[i], grid.resolution_m()), state);
+  boxes.for_each_alive(
+      [&](const scene::Box& box) { grid.set(scene::to_voxels(box, grid.resolution_m()), state); });
 }
 
 }  // namespace

@@ -22,6 +22,7 @@ class GuideQuery final : public search::Query {
   GuideQuery(const model::Model& model, const World& world, const WorldView& view);
 
   /// Takes the newest snapshot, as it is at a time; to be called once before anything else.
+  /// @param allowance that of the goal that is searched for: WorldSnapshot::allowance
   /// @return its number
   std::uint64_t refresh(double time_s, std::uint64_t allowance = 0);
 

@@ -50,9 +50,8 @@ SensedMap::SensedMap(const scene::Environment& environment)
       close_gaps_(unknown_matters_ && environment.map_spec()->points.close_gaps),
       grid_(sensing::grid_of(environment, model_of(environment.map_spec()->points))),
       standing_(grid_.box()) {
-  const scene::BoxField& boxes = environment.map_field().boxes();
-  for (std::size_t i = 0; i < boxes.boxes().size(); ++i)
-    if (boxes.alive(i)) standing_.set(scene::to_voxels(boxes.boxes()[i], grid_.resolution_m()));
+  environment.map_field().boxes().for_each_alive(
+      [&](const scene::Box& box) { standing_.set(scene::to_voxels(box, grid_.resolution_m())); });
 }
 
 bool SensedMap::occupied(const Eigen::Vector3d& p) const {

@@ -31,13 +31,17 @@ World::Allowed& World::allowed(std::vector<Allowed>& among, const scene::Allowan
   return among.emplace_back(Allowed{++last_allowance_, 0, allowance, std::move(map)});
 }
 
+bool World::allows() const {
+  const std::lock_guard lock(mutex_);
+  return !allowed_.empty();
+}
+
 std::vector<std::uint64_t> World::allow(const std::vector<scene::Allowance>& allowances) {
   for (const scene::Allowance& allowance : allowances) check(allowance, "may_touch");
   std::vector<std::uint64_t> out(allowances.size(), 0);
   const bool none = std::all_of(allowances.begin(), allowances.end(),
                                 [](const auto& allowance) { return allowance.empty(); });
-  const std::lock_guard allowed_lock(allowed_mutex_);
-  if (none && !allows_) return out;
+  if (none && !allows()) return out;
   const std::lock_guard map_lock(map_mutex_);
   std::vector<Allowed> next = allowed_;
   ++allowed_lists_;
@@ -50,7 +54,6 @@ std::vector<std::uint64_t> World::allow(const std::vector<scene::Allowance>& all
   std::erase_if(next, [&](const Allowed& entry) { return entry.list + 1 < allowed_lists_; });
   const std::lock_guard lock(mutex_);
   allowed_ = std::move(next);
-  allows_ = !allowed_.empty();
   publish(latest_->environment, latest_->obstacle_ids, Changes::moving);
   return out;
 }

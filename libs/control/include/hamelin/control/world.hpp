@@ -175,6 +175,7 @@ class World {
     scene::Allowance allowance;
     scene::Environment map;
   };
+  [[nodiscard]] bool allows() const;
   /// The entry for an allowance, which is added if there is none.
   [[nodiscard]] Allowed& allowed(std::vector<Allowed>& among, const scene::Allowance& allowance);
   /// All of them in an environment with another map.
@@ -203,9 +204,8 @@ class World {
   const model::Model& model_;
   std::size_t contacts_max_ = 0;
   // The control loop takes none of these.
-  std::mutex allowed_mutex_;         ///< of `allows_`; taken before the others
   std::mutex map_mutex_;             ///< among writers of the map; taken before `mutex_`
-  std::mutex mutex_;                 ///< among writers
+  mutable std::mutex mutex_;         ///< among writers
   mutable std::mutex latest_mutex_;  ///< of `latest_`, which only writers change
   std::int32_t next_id_ = 0;
   std::map<std::int32_t, MotionEstimator> streams_;  ///< of observed poses, by the obstacle's id
@@ -214,7 +214,6 @@ class World {
   std::uint64_t last_number_ = 0;  ///< of a snapshot
   /// Changed by who has locked both `map_mutex_` and `mutex_`.
   std::vector<Allowed> allowed_;
-  bool allows_ = false;  ///< whether there are any
   std::uint64_t allowed_lists_ = 0, last_allowance_ = 0;
   std::shared_ptr<const WorldSnapshot> latest_;
   std::unique_ptr<Newest<View>> newest_;

@@ -1,5 +1,7 @@
 #pragma once
+#include <algorithm>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "hamelin/scene/boxes.hpp"
@@ -13,6 +15,9 @@ struct Allowance {
 
   [[nodiscard]] bool operator==(const Allowance&) const = default;
   [[nodiscard]] bool empty() const noexcept { return boxes_m.empty() && obstacles.empty(); }
+  [[nodiscard]] bool names(std::string_view obstacle) const {
+    return std::find(obstacles.begin(), obstacles.end(), obstacle) != obstacles.end();
+  }
 };
 
 /// @throws Error invalid, "where: what is wrong", for a box without volume or with numbers that are

@@ -61,6 +61,12 @@ class BoxField {
   [[nodiscard]] bool alive(std::size_t box) const noexcept {
     return boxes_[box].lo.x() < std::numeric_limits<double>::infinity();
   }
+  /// Calls `f(box)` for each box that has not been removed.
+  template <class F>
+  void for_each_alive(F&& f) const {
+    for (std::size_t i = 0; i < boxes_.size(); ++i)
+      if (alive(i)) f(boxes_[i]);
+  }
   /// Removes boxes permanently and replaces all boxes that earlier calls added by `added`. The tree
   /// of the first boxes is kept, and the added boxes get a second tree below the same root:
   /// O(removed + added log added). If there are too many of them, one tree is built from all boxes.
