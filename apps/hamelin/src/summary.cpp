@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -101,6 +103,15 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
       line("may touch",
            fmt::format("at goal {}, {} m from it at least", allowed["goal"].get<std::size_t>(),
                        number(allowed["clearance_m"])));
+  if (r.contains("constraints"))
+    for (const Json& kept : r["constraints"]) {
+      const double excess = kept["excess"].get<double>();
+      line("constraint",
+           fmt::format("{} of goal {} ({}): {} by {} {}", kept["constraint"].get<std::size_t>(),
+                       kept["goal"].get<std::size_t>(), kept["type"].get<std::string>(),
+                       excess > 0.0 ? "exceeded" : "kept", number(std::abs(excess)),
+                       kept["type"] == "axis" ? "rad" : "m"));
+    }
   if (r.contains("torque_change"))
     line("torque",
          fmt::format("changes by {} Nm from tick to tick on the mean, by {} Nm at most",

@@ -229,6 +229,12 @@ Json to_json(const Result& r) {
   for (const auto& allowed : r.may_touch)
     document["may_touch"].push_back(
         {{"goal", allowed.goal}, {"what", allowed.what}, {"clearance_m", allowed.clearance_m}});
+  for (const auto& kept : r.constraints)
+    document["constraints"].push_back({{"goal", kept.goal},
+                                       {"constraint", kept.constraint},
+                                       {"type", kept.type},
+                                       {"excess", kept.excess},
+                                       {"time_s", kept.time_s}});
   if (r.mover_contact) document["mover_contact"] = contact_json(*r.mover_contact);
   if (r.plant)
     document["plant"] = {{"type", r.plant->type},

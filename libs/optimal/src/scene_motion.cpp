@@ -62,6 +62,10 @@ void check_scene(const scene::Scene& scene, bool has_paths) {
       refuse_scene(scene, fmt::format("/goals/{}/may_touch: is given, expected none: optimised "
                                       "motions keep away from all obstacles",
                                       i));
+    if (!scene.goals[i].constraints.empty())
+      refuse_scene(scene, fmt::format("/goals/{}/constraints: are given, expected none: optimised "
+                                      "motions do not keep them",
+                                      i));
     if (type != scene::GoalType::joint && !has_paths)
       refuse_scene(scene,
                    fmt::format("/goals/{}: is a {}, expected joint positions, or a guide that "

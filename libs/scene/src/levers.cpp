@@ -17,7 +17,8 @@ Levers::Levers(const model::Model& model, const SelfField* self)
       travel_(VectorXd::Zero(model.dof())),
       shapes_(Eigen::MatrixXd::Zero(static_cast<Index>(model.shapes().size()), model.dof())),
       pairs_(Eigen::MatrixXd::Zero(self != nullptr ? static_cast<Index>(self->pairs().size()) : 0,
-                                   model.dof())) {
+                                   model.dof())),
+      tip_(VectorXd::Zero(model.dof())) {
   dynamics::Workspace ws(model);
   dynamics::forward_kinematics(model, ws, VectorXd::Zero(model.dof()));
   for (Index j = 0; j < model.dof(); ++j) {
@@ -31,17 +32,23 @@ Levers::Levers(const model::Model& model, const SelfField* self)
   set();
 }
 
+void Levers::fill(int link, double length,
+                  Eigen::Ref<Eigen::RowVectorXd, 0, Eigen::InnerStride<>> levers) const {
+  for (Index j = link; j >= 0; --j) {
+    levers[j] = slides(j) ? 1.0 : length;
+    length += frame_distance_[j] + travel_[j];
+  }
+}
+
 // docs/theory.md (12.3), (12.11)
 void Levers::set() {
   for (std::size_t s = 0; s < model_.shapes().size(); ++s) {
     const auto& shape = model_.shapes()[s];
-    double length =
-        std::max((shape.center - shape.half_axis).norm(), (shape.center + shape.half_axis).norm());
-    for (Index j = shape.link; j >= 0; --j) {
-      shapes_(static_cast<Index>(s), j) = slides(j) ? 1.0 : length;
-      length += frame_distance_[j] + travel_[j];
-    }
+    fill(shape.link,
+         std::max((shape.center - shape.half_axis).norm(), (shape.center + shape.half_axis).norm()),
+         shapes_.row(static_cast<Index>(s)));
   }
+  fill(model_.robot().tip.link, model_.tip_in_frame().p().norm(), tip_.transpose());
   for (Index k = 0; k < pairs_.rows(); ++k) {
     const auto& pair = self_->pairs()[static_cast<std::size_t>(k)];
     const auto* inner = &self_->parts()[static_cast<std::size_t>(pair.part_a)];

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/core/text.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/scene/scene.hpp"
@@ -335,6 +336,37 @@ void read_trajectory_of(const Reader& in, const std::filesystem::path& folder, G
   set_trajectory(goal, read_joint_trajectory(goal.path_file));
 }
 
+// A corner of a box; null: it has no end there.
+Eigen::Vector3d read_corner(const Reader& in, const char* key, double end) {
+  const Json* given = in.find(key);
+  Eigen::Vector3d out = Eigen::Vector3d::Constant(end);
+  for (std::size_t i = 0; given != nullptr && i < 3; ++i)
+    if (!(*given)[i].is_null()) out[static_cast<Eigen::Index>(i)] = (*given)[i].get<double>();
+  return out;
+}
+
+TipConstraint read_constraint(const Reader& in) {
+  const auto type = in.get<std::string>("type", "");
+  const std::string kind = "constraint of type " + type;
+  const bool is_axis = type == "axis";
+  for (const char* key : {"axis", "direction", "angle_rad"})
+    if (!is_axis) in.refuse(key, kind);
+  for (const char* key : {"position_m", "quaternion_wxyz", "low_m", "high_m"})
+    if (is_axis) in.refuse(key, kind);
+  TipConstraint out;
+  if (is_axis) {
+    in.require("angle_rad", kind);
+    const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+    out = AxisConstraint{in.vector("axis", up), in.vector("direction", up),
+                         in.get("angle_rad", 0.0)};
+  } else {
+    out = BoxConstraint{in.pose(), in.quaternion(), read_corner(in, "low_m", -infinity),
+                        read_corner(in, "high_m", infinity)};
+  }
+  check(out, in.place());
+  return out;
+}
+
 Goal read_goal(const Reader& in, const std::filesystem::path& folder) {
   const auto type = in.get<std::string>("type", "");
   const bool path = type == "path", trajectory = type == "trajectory";
@@ -379,6 +411,8 @@ Goal read_goal(const Reader& in, const std::filesystem::path& folder) {
   goal.may_touch = {read_boxes(may_touch, "boxes_m"),
                     may_touch.get<std::vector<std::string>>("obstacles", {})};
   check(goal.may_touch, in.place_of("may_touch"));
+  in.each("constraints",
+          [&](const Reader& each) { goal.constraints.push_back(read_constraint(each)); });
   return goal;
 }
 

@@ -100,6 +100,9 @@ Json goal_to_reach_json(const Goal& goal) {
 Json goal_json(const Goal& goal) {
   Json out = goal.type == GoalType::follow ? follow_json(goal) : goal_to_reach_json(goal);
   out["may_touch"] = to_json(goal.may_touch);
+  out["constraints"] = Json::array();
+  for (const TipConstraint& constraint : goal.constraints)
+    out["constraints"].push_back(to_json(constraint));
   return out;
 }
 

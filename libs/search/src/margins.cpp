@@ -1,6 +1,7 @@
 #include "hamelin/search/margins.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "hamelin/search/joint_metric.hpp"
 
@@ -18,8 +19,9 @@ double Margins::margin_at(const Place& place, double distance) const {
   return place.margin + weight * (full_ - place.margin);
 }
 
-Margins Margins::raised(double by_m) const {
+Margins Margins::raised(double by_m, VectorXd stray) const {
   Margins out = *this;
+  out.stray_ = std::move(stray);
   out.full_ += by_m;
   out.self_most_ += by_m;
   for (Place& place : out.places_) place.margin += by_m;

@@ -67,6 +67,7 @@ void Roots::begin(const Problem& problem) {
   attempts_ = rounds_ = next_ = ordered_ = steps_ = 0;
   checks_ = 0;
   goal_ = 0;
+  excess_.reset();
   found_.assign(problem.goals.size(), 0);
 }
 
@@ -81,7 +82,7 @@ bool Roots::tries(std::size_t roots) const noexcept {
 bool Roots::take(const VectorXd& q, Query& query, Root& root) {
   for (std::size_t i = 0; i < problem_->goals.size(); ++i) {
     const scene::Goal& goal = problem_->goals[i];
-    if (!reaches(goal, q)) continue;
+    if (!reaches(goal, q) || !keeps(query, q)) continue;
     const bool joint = goal.type == scene::GoalType::joint;
     const double least = std::max(1e-6, joint ? settings_.least_m : settings_.root_clearance_m);
     root = {q, query.clearance(q, least)};
@@ -102,6 +103,14 @@ bool Roots::reaches(const scene::Goal& goal, const VectorXd& q) {
           Eigen::AngleAxisd(goal.pose.R().transpose() * tip.R()).angle() < goal.tolerance_rad);
 }
 
+bool Roots::keeps(Query& query, const VectorXd& q) {
+  TipConstraints* constraints = query.constraints();
+  if (constraints == nullptr || constraints->keeps(q)) return true;
+  if (const auto excess = constraints->excess(q); !excess_ || excess.by < excess_->by)
+    excess_ = excess;
+  return false;
+}
+
 bool Roots::attempt(Query& query, Rng& rng, Root& root) {
   if (steps_ > 0) {
     continue_batch();
@@ -119,7 +128,8 @@ bool Roots::at_next_goal(Query& query, Rng& rng, Root& root) {
     found = at_joints(goal, query, rng, root);
     found_[which] = found ? 1 : 0;
   }
-  if (!joint) begin_batch(goal, rng);
+  if (!joint) begin_batch(goal, query, rng);
+  batch_goal_ = which;
   attempts_ += joint ? 1 : kernel::lanes;
   if (++goal_ == problem_->goals.size()) {
     goal_ = 0;
@@ -128,27 +138,38 @@ bool Roots::at_next_goal(Query& query, Rng& rng, Root& root) {
   return found;
 }
 
-bool Roots::at_joints(const scene::Goal& goal, Query& query, Rng& rng, Root& root) const {
+bool Roots::at_joints(const scene::Goal& goal, Query& query, Rng& rng, Root& root) {
   root.q = goal.q;
   if (rounds_ > 0)  // the goal itself is not clear, but a place within its tolerance may be
     for (double& x : root.q)
       x += joint_tolerance_share * goal.tolerance_rad * rng.uniform(-1.0, 1.0);
+  if (!keeps(query, root.q)) return false;
   root.clearance = query.clearance(root.q, settings_.least_m);
   return root.clearance > 0.0 && root.clearance >= settings_.least_m;
 }
 
 // The first posture of all is the start, with the goal itself as its target.
-void Roots::begin_batch(const scene::Goal& goal, Rng& rng) {
+void Roots::begin_batch(const scene::Goal& goal, Query& query, Rng& rng) {
   const dynamics::TipTarget target = tip_target(goal);
   for (int l = 0; l < kernel::lanes; ++l) {
     const bool first = rounds_ == 0 && l == 0;
-    targets_[static_cast<std::size_t>(l)] = first ? target : draw_near(target, rng);
+    dynamics::TipTarget& drawn = targets_[static_cast<std::size_t>(l)];
+    drawn = first ? target : draw_near(target, rng);
     box_.draw(rng, sample_);
-    q_.col(l) = first ? problem_->start.cwiseMax(box_.lower).cwiseMin(box_.upper) : sample_;
+    if (first) sample_ = problem_->start.cwiseMax(box_.lower).cwiseMin(box_.upper);
+    if (query.constraints() != nullptr) restrict(*query.constraints(), drawn);
+    q_.col(l) = sample_;
   }
   if (!root_lanes_.fits()) return order_batch(kernel::all_lanes);
   root_lanes_.begin(targets_, q_);
   steps_ = steps_max;
+}
+
+// If no root is found, it may be because the goal itself exceeds a constraint.
+void Roots::restrict(TipConstraints& constraints, dynamics::TipTarget& target) {
+  if (const auto excess = constraints.excess(target); excess.by > 0.0 && !excess_.has_value())
+    excess_ = excess;
+  constraints.restrict(target, sample_);
 }
 
 void Roots::continue_batch() {
@@ -190,6 +211,9 @@ bool Roots::at_tip(Query& query, Root& root) {
   ++checks_;
   sample_ = q_.col(lane);
   if (!kinematics_.solve(targets_[static_cast<std::size_t>(lane)], sample_)) return false;
+  if (query.constraints() != nullptr &&
+      (!keeps(query, sample_) || !reaches(problem_->goals[batch_goal_], sample_)))
+    return false;
   const double least = std::max(1e-6, least_clearance());
   root.q = sample_;
   root.clearance = query.clearance(root.q, least);

@@ -1,11 +1,13 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "hamelin/core/rng.hpp"
 #include "hamelin/dynamics/inverse_kinematics.hpp"
 #include "hamelin/search/search.hpp"
+#include "hamelin/search/tip_constraints.hpp"
 #include "root_lanes.hpp"
 
 namespace hamelin::search {
@@ -37,12 +39,19 @@ class Roots {
   [[nodiscard]] bool take(const Eigen::VectorXd& q, Query& query, Root& root);
   /// Steps of inverse kinematics, besides the checks of the query, since begin().
   [[nodiscard]] long checks() const noexcept { return checks_; }
+  /// By how much a goal exceeds a constraint of the tip, of those that were tried; none: none did.
+  [[nodiscard]] const std::optional<TipConstraints::Excess>& excess() const noexcept {
+    return excess_;
+  }
 
  private:
-  [[nodiscard]] bool at_joints(const scene::Goal& goal, Query& query, Rng& rng, Root& root) const;
+  [[nodiscard]] bool at_joints(const scene::Goal& goal, Query& query, Rng& rng, Root& root);
   [[nodiscard]] bool at_next_goal(Query& query, Rng& rng, Root& root);
   [[nodiscard]] bool reaches(const scene::Goal& goal, const Eigen::VectorXd& q);
-  void begin_batch(const scene::Goal& goal, Rng& rng);
+  /// Whether the tip keeps the query's constraints.
+  [[nodiscard]] bool keeps(Query& query, const Eigen::VectorXd& q);
+  void begin_batch(const scene::Goal& goal, Query& query, Rng& rng);
+  void restrict(TipConstraints& constraints, dynamics::TipTarget& target);
   void continue_batch();
   void order_batch(unsigned near);
   [[nodiscard]] bool at_tip(Query& query, Root& root);
@@ -56,8 +65,9 @@ class Roots {
   const model::Model& model_;
   dynamics::Workspace ws_;
   const Problem* problem_ = nullptr;
-  std::vector<char> found_;        ///< joint goals that need no other root
-  std::size_t goal_ = 0;           ///< of the next batch
+  std::vector<char> found_;                ///< joint goals that need no other root
+  std::size_t goal_ = 0, batch_goal_ = 0;  ///< of the next batch, and of the last one
+  std::optional<TipConstraints::Excess> excess_;
   int attempts_ = 0, rounds_ = 0;  ///< of all goals; and how often each had its turn
   long checks_ = 0;
   int steps_ = 0;  ///< that the batch may still take towards its targets

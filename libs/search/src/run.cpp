@@ -22,6 +22,8 @@ constexpr double near_goal = 0.2, far_goal = 0.9, near_start = 0.02, far_start =
 constexpr double start_slack_m = 2e-4;  // by which the clearance of the start may be undercut
 constexpr double limit_reserve = 1e-3;  // kept from joint limits [rad or m]
 constexpr double range = 0.5;           // the longest edge by which a tree grows
+// The same where the tip keeps constraints, and what a step gains at least, as a share.
+constexpr double constrained_range = 0.25, least_progress = 0.2;
 // Share of the samples around the start or a root, where ways are often narrow, and their spread.
 constexpr double near_share = 0.3, near_spread = 0.5;
 constexpr double near_known_share = 0.7;  // around the gap in a known path
@@ -47,7 +49,8 @@ Search::Run::Run(const model::Model& model, const Settings& settings)
       from_start_(weights_, nodes),
       from_goal_(weights_, nodes),
       sample_(VectorXd::Zero(model.dof())),
-      at_(sample_) {}
+      at_(sample_),
+      aim_(sample_) {}
 
 void Search::Run::begin(const Problem& problem, Query& query) {
   problem_ = problem;
@@ -68,6 +71,12 @@ void Search::Run::begin(const Problem& problem, Query& query) {
   if (start_clearance_ <= 0.0) return end("the arm is in contact where it is");
   const double self = query.self_clearance(problem_.start, settings_.self_margin_m + start_slack_m);
   self_most_ = std::max(0.0, self - start_slack_m);
+  constraints_ = query.constraints();
+  if (constraints_ != nullptr) {
+    if (const auto excess = constraints_->excess(problem_.start); excess.by > 0.0)
+      return end("where the arm is, " + constraints_->describe(excess));
+    constraints_->admit(problem_.start);
+  }
   bounds_.lower = bounds_.lower.cwiseMin(problem_.start);
   bounds_.upper = bounds_.upper.cwiseMax(problem_.start);
 }
@@ -104,6 +113,7 @@ void Search::Run::step() {
     case Phase::grow:
       return grow();
     case Phase::connect:
+    case Phase::walk:
       return connect();
     case Phase::shorten:
       return shorten();
@@ -127,6 +137,7 @@ void Search::Run::take_answer(bool clear) {
       phase_ = Phase::connect;
       return;
     case Phase::connect:
+    case Phase::walk:
       return take_connected(clear);
     case Phase::shorten:
     case Phase::improve:
@@ -146,12 +157,18 @@ void Search::Run::find_first_root() {
     knows_ = finder_.take(problem_.known.rightCols<1>(), *query_, root);
   }
   if (!knows_) {
-    if (!finder_.tries(0)) return end("no clear configuration was found at the goal");
+    if (!finder_.tries(0)) return end(no_root());
     if (!finder_.attempt(*query_, rng_, root)) return;
   }
   add_root(root);
   from_start_.add(problem_.start, -1);
   phase_ = Phase::straight;
+}
+
+std::string Search::Run::no_root() const {
+  if (const auto& excess = finder_.excess(); excess && excess->by > 0.0)
+    return "at the goal, " + constraints_->describe(*excess);
+  return "no clear configuration was found at the goal";
 }
 
 void Search::Run::add_root(const Root& root) {
@@ -275,24 +292,54 @@ void Search::Run::grow() {
   draw();
   near_ = tree.nearest(sample_);
   at_ = tree.q(near_);
-  const double distance = weighted_distance(weights_, at_, sample_);
-  if (distance < met) return;
-  if (distance > range) sample_ = at_ + range / distance * (sample_ - at_);
-  ask(at_, sample_);
+  aim_ = sample_;
+  if (step_towards(aim_)) ask(at_, sample_);
 }
 
-// The other tree tries the whole line to the new node.
+// Sets sample_ to a place at most a range from at_ towards another, where the tip keeps its
+// constraints. @return whether that is nearer
+bool Search::Run::step_towards(const VectorXd& to) {
+  const double distance = weighted_distance(weights_, at_, to),
+               longest = constraints_ != nullptr ? constrained_range : range;
+  if (distance < met) return false;
+  if (distance > longest)
+    sample_ = at_ + longest / distance * (to - at_);
+  else
+    sample_ = to;
+  if (constraints_ == nullptr) return true;
+  if (distance > longest && !constraints_->project(sample_, box_)) return false;
+  const double step = weighted_distance(weights_, at_, sample_);
+  return step > met && step < 2.0 * longest &&
+         weighted_distance(weights_, sample_, to) <
+             distance - least_progress * std::min(distance, longest);
+}
+
+// The other tree tries the whole line to the new node, or steps towards it where the tip keeps
+// constraints.
 void Search::Run::connect() {
   const Tree& other = grows_start_ ? from_goal_ : from_start_;
-  near_ = other.nearest(sample_);
+  if (phase_ == Phase::connect) {
+    near_ = other.nearest(sample_);
+    aim_ = sample_;
+  }
   at_ = other.q(near_);
-  if (weighted_distance(weights_, at_, sample_) < met) return take_connected(true);
+  if (weighted_distance(weights_, at_, aim_) < met) return take_connected(true);
+  if (constraints_ != nullptr && !step_towards(aim_)) {
+    phase_ = Phase::grow;
+    return;
+  }
   ask(at_, sample_);
 }
 
 void Search::Run::take_connected(bool clear) {
   phase_ = Phase::grow;
-  if (clear) grows_start_ ? join(node_, near_) : join(near_, node_);
+  if (!clear) return;
+  if (constraints_ != nullptr && weighted_distance(weights_, sample_, aim_) >= met) {
+    near_ = (grows_start_ ? from_goal_ : from_start_).add(sample_, near_);
+    phase_ = Phase::walk;
+    return;
+  }
+  grows_start_ ? join(node_, near_) : join(near_, node_);
 }
 
 void Search::Run::join(int in_start, int in_goal) {

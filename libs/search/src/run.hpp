@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "hamelin/search/search.hpp"
+#include "hamelin/search/tip_constraints.hpp"
 #include "roots.hpp"
 #include "shortening.hpp"
 #include "tree.hpp"
@@ -32,6 +33,7 @@ class Search::Run {
     known_back,
     grow,
     connect,
+    walk,
     shorten,
     improve,
     ended
@@ -42,6 +44,8 @@ class Search::Run {
   void find_first_root();
   /// Takes up the search again with the next, smaller margin. Ends it if there is none.
   void next_margins();
+  /// Why there is no root.
+  [[nodiscard]] std::string no_root() const;
   void add_root(const Root& root);
   void set_margins();
   void take_straight(bool clear);
@@ -50,6 +54,7 @@ class Search::Run {
   void take_known(bool clear);
   void find_more_roots();
   void grow();
+  [[nodiscard]] bool step_towards(const Eigen::VectorXd& to);
   void connect();
   void take_connected(bool clear);
   void shorten();
@@ -70,6 +75,7 @@ class Search::Run {
   Tree from_start_, from_goal_;
   Problem problem_;
   Query* query_ = nullptr;
+  TipConstraints* constraints_ = nullptr;  ///< of the query
   Rng rng_{0};
   Phase phase_ = Phase::ended;
   bool asked_ = false;  ///< a motion is being proved
@@ -87,9 +93,9 @@ class Search::Run {
   long next_root_ = 0, improve_until_ = 0;
   std::optional<Margins> margins_;
   bool grows_start_ = true;
-  int near_ = 0;  ///< node from which a motion leads to the sample
-  int node_ = 0;  ///< that the other tree is to be connected with
-  Eigen::VectorXd sample_, at_;
+  int near_ = 0;                       ///< node from which a motion leads to the sample
+  int node_ = 0;                       ///< that the other tree is to be connected with
+  Eigen::VectorXd sample_, at_, aim_;  ///< aim_: to which the other tree walks
   Path path_;
 };
 

@@ -45,7 +45,8 @@ Judge::Judge(const scene::Scene& scene, const model::Model& model, Plant& plant,
       plant_(plant),
       limits_(control::modelled_limits(scene, model.robot())),
       certifies_(scene::safety_type(scene) != scene::SafetyType::none),
-      view_(controllers) {
+      view_(controllers),
+      constraints_(scene, model) {
   if (controllers == nullptr)
     own_ = std::make_unique<control::WorldView>(scene, model, control::default_influence_m);
   else if (scene.map && !scene.map->known)
@@ -62,6 +63,7 @@ Judge::Judge(const scene::Scene& scene, const model::Model& model, Plant& plant,
 
 // Motions that leave this node are judged by what is allowed from here on.
 void Judge::allow(const scene::Allowance* may_touch, std::size_t goal) {
+  constraints_.set_goal(goal);
   const scene::Allowance next = may_touch != nullptr ? *may_touch : scene::Allowance{};
   if (next == may_touch_ && (next.empty() || goal == goal_)) return;
   may_touch_ = next;
@@ -76,6 +78,7 @@ void Judge::observe_node() {
   view_->look(plant_.node().q, plant_.node().time_s);
   note_limits();
   note_clearance();
+  constraints_.observe(plant_.node().q, plant_.node().time_s);
   touching_ = view_->touching();
   contacts_ = plant_.contacts();
   if (plant_.node().k > 0 && certifies_ && (view_->has_obstacles() || view_->has_self())) certify();
@@ -232,6 +235,8 @@ void Judge::fill(log::Result& result) const {
   result.speed_excess = speed_excess_;
   result.tightest_step_m = tightest_step_m_;
   result.may_touch = allowed_;
+  result.constraints = constraints_.figures();
+  for (std::string& line : constraints_.violations()) result.warnings.push_back(std::move(line));
   if (checked_steps_ > 0)
     result.certified_share =
         static_cast<double>(certified_steps_) / static_cast<double>(checked_steps_);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "constraint_audit.hpp"
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/log/result.hpp"
@@ -78,7 +79,8 @@ class Judge {
   control::WorldView* view_;                 ///< that, or the controller's
   bool certified_ = true, touching_ = false;
   std::string on_the_way_;
-  std::size_t goal_ = 0;                        ///< the current one
+  std::size_t goal_ = 0;  ///< the current one
+  ConstraintAudit constraints_;
   scene::Allowance may_touch_;                  ///< that of the current goal
   std::vector<log::Result::MayTouch> allowed_;  ///< the last one is in force, if any is
   Plant::Contacts contacts_;                    ///< by the plant

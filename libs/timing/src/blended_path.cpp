@@ -4,6 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "hamelin/core/numbers.hpp"
+#include "hamelin/search/tip_constraints.hpp"
+
 namespace hamelin::timing {
 
 using Eigen::Index;
@@ -17,6 +20,8 @@ constexpr int tries = 6;
 // Chords by which a blend is proved [rad or m]; at least so many.
 constexpr double chord = 0.08;
 constexpr int chords_least = 4;
+// Share of what plans leave of the tip's tolerances that a blend may use without a proof.
+constexpr double reserve_share = 0.1;
 
 }  // namespace
 
@@ -91,7 +96,7 @@ bool Blending::is_clear(const BlendedPath& path, Index point, const search::Marg
   const int n = std::max(chords_least, 2 * static_cast<int>(std::ceil(d / chord)));
   const double h = 2.0 * d / n;
   const VectorXd stray = h * h / (8.0 * d) * path.turn(point).cwiseAbs();
-  query.set_margins(margins.raised(levers_.reach(stray) + margins.slope() * stray.norm()));
+  query.set_margins(margins.raised(levers_.reach(stray) + margins.slope() * stray.norm(), stray));
   VectorXd last, next;
   path.blend_at(point, -d, last);
   for (int k = 1; k <= n; ++k) {
@@ -102,11 +107,22 @@ bool Blending::is_clear(const BlendedPath& path, Index point, const search::Marg
   return true;
 }
 
+// The half-length of a blend that needs no proof.
+double Blending::unproved_half_length(const VectorXd& turn, search::Query& query) const {
+  const VectorXd size = turn.cwiseAbs();
+  const double cut = levers_.reach(size) / 6.0;
+  double most = cut > 0.0 ? loss_m / cut : infinity;
+  if (const search::TipConstraints* constraints = query.constraints())
+    if (const double used = constraints->reserve_used(size) / 6.0; used > 0.0)
+      most = std::min(most, reserve_share / used);
+  return most;
+}
+
 void Blending::widen(BlendedPath& path, const search::Margins& margins, search::Query& query,
                      Index first, Index last) {
   for (Index i = first; i <= last; ++i) {
-    const double cut = levers_.reach(path.turn(i).cwiseAbs()) / 6.0, room = path.room(i),
-                 free = std::min(room, cut > 0.0 ? loss_m / cut : room);  // needs no proof
+    const double room = path.room(i),
+                 free = std::min(room, unproved_half_length(path.turn(i), query));
     double d = std::min(path.half_length(i), room);
     path.set_half_length(i, d);
     for (int k = 0; k < tries && d > free && !is_clear(path, i, margins, query); ++k) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "hamelin/search/tip_constraints.hpp"
+
 namespace hamelin::timing {
 
 using Eigen::Index;
@@ -47,11 +49,23 @@ WayPoints::WayPoints(const model::Model& model, const scene::Levers& levers, con
     : law_(model, without_torques(limits), coarse),
       blending_(levers),
       q_lower_(std::move(q_lower)),
-      q_upper_(std::move(q_upper)) {}
+      q_upper_(std::move(q_upper)),
+      box_(model.dof(), q_lower_, q_upper_, 0.0) {}
 
 void WayPoints::keep_limits(Index point) {
   if (q_lower_.size() > 0)
     trial_.col(point) = trial_.col(point).cwiseMax(q_lower_).cwiseMin(q_upper_);
+}
+
+// The way-points between the lines that are new.
+bool WayPoints::keep_constraints(const Change& changed, search::Query& query) {
+  search::TipConstraints* constraints = query.constraints();
+  for (Index i = changed.first + 1; constraints != nullptr && i <= changed.last; ++i) {
+    VectorXd q = trial_.col(i);
+    if (!constraints->project(q, box_)) return false;
+    trial_.col(i) = q;
+  }
+  return true;
 }
 
 // Blends are taken to be as wide as they are now, as shares of what there is room for.
@@ -122,7 +136,7 @@ double WayPoints::improve(BlendedPath& path, const search::Margins& margins, sea
   spread_ = first_spread;
   for (int k = 0; k < effort.tries && path.corners() > 0 && query.checks() < until; ++k) {
     const Change changed = change(path.points(), rng);
-    if (!are_apart(trial_)) continue;
+    if (!keep_constraints(changed, query) || !are_apart(trial_)) continue;
     BlendedPath candidate(trial_);
     predict(path, changed, candidate);
     if (!(law_.duration_s(candidate.curve()) < worth_proof * best)) {

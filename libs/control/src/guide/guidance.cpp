@@ -50,8 +50,9 @@ Guidance::News Guidance::update(const Now& now, GuideSearch& search) {
 void Guidance::begin(const Now& now) {
   goal_number_ = now.goal_number;
   follows_ = now.goal.type == scene::GoalType::follow;
-  const bool guided =
-      spec_.type != scene::GuideType::on_request && !follows() && now.goal.path.cols() == 0;
+  constrained_ = !now.goal.constraints.empty();
+  const bool guided = constrained_ || (spec_.type != scene::GuideType::on_request && !follows() &&
+                                       now.goal.path.cols() == 0);
   mode_ = guided ? Mode::waiting : Mode::off;
   awaits_ = false;
   wants_ = guided;
@@ -71,8 +72,10 @@ bool Guidance::request() {
   return true;
 }
 
+// Without a path nothing would keep constraints: then the arm goes on waiting for one.
 void Guidance::give_up_path() noexcept {
-  mode_ = Mode::unguided;
+  mode_ = constrained_ ? Mode::waiting : Mode::unguided;
+  wants_ = constrained_;
   ++number_;
 }
 
@@ -91,6 +94,7 @@ void Guidance::ask(const Now& now, GuideSearch& search) {
   }
   request.goal.tolerance_m = now.goal.tolerance_m;
   request.goal.tolerance_rad = now.goal.tolerance_rad;
+  request.goal.constraints = now.goal.constraints;
   request.search = asked_;
   request.kept_count = 0;
   if (mode_ == Mode::guided && !follows()) fill_kept(now, request);
@@ -128,7 +132,7 @@ Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
     return News::path;
   }
   cause_.assign(answer.path.cause, 0, cause_max);
-  if (mode_ == Mode::waiting) {
+  if (mode_ == Mode::waiting && !constrained_) {
     mode_ = Mode::unguided;
     if (!follows()) ++number_;
   }

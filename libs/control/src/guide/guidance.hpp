@@ -87,7 +87,8 @@ class Guidance {
 
   scene::GuideSpec spec_;
   bool follows_paths_;
-  bool follows_ = false;  ///< whether the goal follows a target
+  bool follows_ = false;      ///< whether the goal follows a target
+  bool constrained_ = false;  ///< whether the tip keeps something on the way
   double check_time_s_;
   Mode mode_ = Mode::off;
   Eigen::MatrixXd path_;

@@ -12,6 +12,7 @@ using Eigen::VectorXd;
 GuideRequest::GuideRequest(Index dof, Index points_max)
     : q(VectorXd::Zero(dof)), kept(Eigen::MatrixXd::Zero(dof, points_max)) {
   goal.q = q;
+  goal.constraints.reserve(scene::constraints_max);
 }
 
 GuideSearch::GuideSearch(const model::Model& model, const World& world, const WorldView& view,

@@ -3,11 +3,14 @@
 #include <cmath>
 #include <utility>
 
+#include "hamelin/search/constrained_query.hpp"
+
 namespace hamelin::control {
 
 MotionSearch::MotionSearch(const model::Model& model, search::Settings settings,
                            std::unique_ptr<PathTiming> timing, long other_checks)
-    : search_(model, std::move(settings)),
+    : model_(model),
+      search_(model, std::move(settings)),
       timing_(std::move(timing)),
       other_checks_(other_checks) {}
 
@@ -17,6 +20,15 @@ long MotionSearch::other_checks(const scene::GuideSpec& spec) {
 }
 
 MotionSearch::Found MotionSearch::find(const search::Problem& problem, GuideQuery& query) {
+  const auto& kept = problem.goals.front().constraints;
+  if (kept.empty()) return find(problem, query, query);
+  search::TipConstraints constraints(model_, kept);
+  search::ConstrainedQuery constrained(query, constraints);
+  return find(problem, query, constrained);
+}
+
+MotionSearch::Found MotionSearch::find(const search::Problem& problem, const GuideQuery& world,
+                                       search::Query& query) {
   Found out;
   out.path = search_.search(problem, query);
   out.checks = out.path.checks;
@@ -27,7 +39,7 @@ MotionSearch::Found MotionSearch::find(const search::Problem& problem, GuideQuer
   consider_others(problem, out.path, query);
   out.motion = timing_->make(query);
   if (out.motion) {
-    out.motion->standing = query.standing();
+    out.motion->standing = world.standing();
     out.way_points = timing_->points();
   } else {
     out.cause = timing_->cause();
@@ -38,7 +50,7 @@ MotionSearch::Found MotionSearch::find(const search::Problem& problem, GuideQuer
 
 // Other random numbers may lead around the other side of an obstacle.
 void MotionSearch::consider_others(search::Problem problem, const search::Path& first,
-                                   GuideQuery& query) {
+                                   search::Query& query) {
   if (first.points.cols() == 2) return;
   const long until = query.checks() + other_checks_;
   const std::uint64_t number = problem.number;

@@ -30,11 +30,16 @@ class MotionSearch {
     std::string cause;           ///< one line: why a path has no motion
     long checks = 0;             ///< of all
   };
+  /// Paths and motions keep the constraints of the first goal.
   [[nodiscard]] Found find(const search::Problem& problem, GuideQuery& query);
 
  private:
-  void consider_others(search::Problem problem, const search::Path& first, GuideQuery& query);
+  /// @param query of the same world, which also asks for constraints
+  [[nodiscard]] Found find(const search::Problem& problem, const GuideQuery& world,
+                           search::Query& query);
+  void consider_others(search::Problem problem, const search::Path& first, search::Query& query);
 
+  const model::Model& model_;
   search::Search search_;
   std::unique_ptr<PathTiming> timing_;
   long other_checks_;

@@ -64,12 +64,16 @@ VectorXd positive_per_joint(const scene::Scene& scene, const std::vector<double>
 }
 
 void check_follows(const scene::Scene& scene, const planning::Plugin& plugin) {
-  for (std::size_t i = 0; i < scene.goals.size(); ++i)
+  for (std::size_t i = 0; i < scene.goals.size(); ++i) {
+    const std::string defect = constraints_defect(scene.goals[i], scene, plugin);
+    if (!defect.empty())
+      throw Error(ErrorCode::invalid, fmt::format("{}: /goals/{}: {}", scene.name, i, defect));
     if (scene.goals[i].trajectory && !plugin.follows_trajectories())
       throw Error(ErrorCode::invalid,
                   fmt::format("{}: /goals/{}: is a trajectory, which planner '{}' does not follow, "
                               "expected one that does, such as hybrid, or a goal of type path",
                               scene.name, i, plugin.name()));
+  }
   if (follow_goal_of(scene.goals) == nullptr || plugin.follows_targets()) return;
   throw Error(ErrorCode::invalid,
               fmt::format("{}: /goals/{}: follows a target, which planner '{}' does not support, "
@@ -220,6 +224,10 @@ void Controller::run_guide() {
 
 const GuideFigures* Controller::guide_figures() const noexcept {
   return guidance_ ? &guidance_->figures() : nullptr;
+}
+
+std::string_view Controller::guide_cause() const noexcept {
+  return guidance_ && guidance_->waits() ? guidance_->cause() : std::string_view();
 }
 
 std::optional<ShieldReport> Controller::shield_report() const {

@@ -127,9 +127,30 @@ void check_goals(const std::vector<scene::Goal>& goals, const scene::Scene& scen
           "trajectory: the planner does not follow trajectories, expected one that does, such as "
           "hybrid");
     scene::check(goal.may_touch, fmt::format("goal {}: may_touch", i + 1));
+    const std::string defect = constraints_defect(goal, scene, planner);
+    check(defect.empty(), i, defect);
+    for (std::size_t k = 0; k < goal.constraints.size(); ++k)
+      scene::check(goal.constraints[k], fmt::format("goal {}: constraints: {}", i + 1, k + 1));
     check(goal.speed_max > 0.0, i,
           fmt::format("speed_max: {} is not allowed, expected more than 0", goal.speed_max));
   }
+}
+
+std::string constraints_defect(const scene::Goal& goal, const scene::Scene& scene,
+                               const planning::Plugin& planner) {
+  if (goal.constraints.empty()) return {};
+  if (goal.constraints.size() > scene::constraints_max)
+    return fmt::format("constraints: {} given, expected at most {}", goal.constraints.size(),
+                       scene::constraints_max);
+  if (goal.type == scene::GoalType::follow || goal.path.size() > 0)
+    return fmt::format("constraints: are given for a {} goal, expected joint, position or pose",
+                       scene::type_name(goal));
+  if (scene.guide.type == scene::GuideType::none || !planner.follows_paths())
+    return fmt::format(
+        "constraints: planner '{}' moves without a path that keeps them, expected "
+        "one that follows paths, such as hybrid, and a guide",
+        planner.name());
+  return {};
 }
 
 void set_target(const TargetState& target, hamelin_goal& goal) noexcept {

@@ -50,6 +50,10 @@ void check_goals(const std::vector<scene::Goal>& goals, const scene::Scene& scen
                  const model::Model& model, std::size_t path_points_max,
                  const planning::Plugin& planner);
 
+/// Why a goal's constraints cannot be kept with a scene's guide and this planner; empty: they can.
+[[nodiscard]] std::string constraints_defect(const scene::Goal& goal, const scene::Scene& scene,
+                                             const planning::Plugin& planner);
+
 /// What is wrong with the joints of a trajectory for this arm; empty if nothing is.
 [[nodiscard]] std::string joints_defect(const scene::JointTrajectory& trajectory,
                                         const model::Model& model);

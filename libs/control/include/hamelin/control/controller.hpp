@@ -204,6 +204,8 @@ class Controller {
   void run_guide();
   /// What the scene's guide did; null if it has none.
   [[nodiscard]] const GuideFigures* guide_figures() const noexcept;
+  /// Why the arm waits for a path that its guide has not found; empty: it does not.
+  [[nodiscard]] std::string_view guide_cause() const noexcept;
 
   /// The proof for the motion between the last two ticks; empty after the first one and without
   /// Options::certify.

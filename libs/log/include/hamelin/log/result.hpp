@@ -106,6 +106,14 @@ struct Result {
     double clearance_m = 0.0;
   };
   std::vector<MayTouch> may_touch;
+  /// What the tip has to keep on the way to a goal.
+  struct Constraint {
+    std::size_t goal = 0, constraint = 0;  ///< the first have number 1
+    std::string type;                      ///< "axis" or "box"
+    /// By how much it was exceeded at most, negative if it was kept [rad or m], and when.
+    double excess = 0.0, time_s = 0.0;
+  };
+  std::vector<Constraint> constraints;
   /// How well the arm followed the trajectories of goals, tick by tick.
   struct Trajectory {
     double duration_s = 0.0;  ///< of those that were begun

@@ -17,6 +17,8 @@ class Levers {
 
   /// shapes × dof [m/rad, or 1 for prismatic joints].
   [[nodiscard]] const Eigen::MatrixXd& shapes() const noexcept { return shapes_; }
+  /// Of the tip; zero for joints behind it.
+  [[nodiscard]] const Eigen::VectorXd& tip() const noexcept { return tip_; }
   /// SelfField::pairs() × dof.
   [[nodiscard]] const Eigen::MatrixXd& pairs() const noexcept { return pairs_; }
 
@@ -39,12 +41,16 @@ class Levers {
 
  private:
   void set();
+  /// The levers of what is so far from the origin of a link's frame.
+  void fill(int link, double length,
+            Eigen::Ref<Eigen::RowVectorXd, 0, Eigen::InnerStride<>> levers) const;
 
   const model::Model& model_;
   const SelfField* self_;
   Eigen::VectorXd frame_distance_;  ///< of successive joint frames at q = 0 [m]
   Eigen::VectorXd travel_;          ///< largest |q| of prismatic joints [m]
   Eigen::MatrixXd shapes_, pairs_;
+  Eigen::VectorXd tip_;
 };
 
 }  // namespace hamelin::scene

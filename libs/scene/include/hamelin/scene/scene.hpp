@@ -18,6 +18,7 @@
 #include "hamelin/scene/obstacles.hpp"
 #include "hamelin/scene/payload.hpp"
 #include "hamelin/scene/sensors.hpp"
+#include "hamelin/scene/tip_constraint.hpp"
 
 namespace hamelin::scene {
 
@@ -52,6 +53,9 @@ struct TargetStream {
   WhenLost when_lost = WhenLost::hold;
 };
 
+/// The largest number of constraints of a goal.
+inline constexpr std::size_t constraints_max = 8;
+
 struct Goal {
   GoalType type = GoalType::joint;
   Eigen::VectorXd q;  ///< joint [rad or m]
@@ -73,6 +77,7 @@ struct Goal {
   std::optional<Motion> motion;             ///< follow: of the target; none: it is streamed
   TargetStream stream;                      ///< follow without a motion
   Allowance may_touch;                      ///< while this goal is the current one
+  std::vector<TipConstraint> constraints;   ///< kept on the way to it; at most constraints_max
 };
 
 /// Goals with the tolerances that a scene file gets by default.

@@ -37,8 +37,11 @@ class Margins {
   [[nodiscard]] const std::vector<Place>& places() const noexcept { return places_; }
   /// What a configuration must keep [m].
   [[nodiscard]] double required(const Eigen::VectorXd& q) const;
-  /// The same margins, all of them larger by so much [m].
-  [[nodiscard]] Margins raised(double by_m) const;
+  /// The same for a curve whose joints stray so far from the motions that are proved: all margins
+  /// are larger by what that moves shapes [m].
+  [[nodiscard]] Margins raised(double by_m, Eigen::VectorXd stray) const;
+  /// How far joints may be from the motions that are proved; of size zero: they are on them.
+  [[nodiscard]] const Eigen::VectorXd& stray() const noexcept { return stray_; }
   /// By how much they change at most per distance between configurations [m].
   [[nodiscard]] double slope() const;
   /// The least that a configuration on the line between two others must keep.
@@ -48,7 +51,7 @@ class Margins {
   [[nodiscard]] double margin_at(const Place& place, double distance) const;
 
   double full_, self_most_ = std::numeric_limits<double>::infinity();
-  Eigen::VectorXd weights_;
+  Eigen::VectorXd weights_, stray_;
   std::vector<Place> places_;
 };
 

@@ -7,6 +7,8 @@
 
 namespace hamelin::search {
 
+class TipConstraints;
+
 /// What a search asks of the world. Used by one thread. Configurations are dof numbers [rad or m].
 class Query {
  public:
@@ -33,6 +35,8 @@ class Query {
     begin_motion(a, b);
     return *prove(std::numeric_limits<long>::max());
   }
+  /// What the tip keeps on motions that are proved; null: nothing.
+  [[nodiscard]] virtual TipConstraints* constraints() noexcept { return nullptr; }
   /// How much work the calls so far took: the arm was placed so many times.
   [[nodiscard]] virtual long checks() const = 0;
 };

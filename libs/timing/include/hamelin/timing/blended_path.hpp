@@ -59,6 +59,8 @@ class Blending {
  private:
   [[nodiscard]] bool is_clear(const BlendedPath& path, Eigen::Index point,
                               const search::Margins& margins, search::Query& query);
+  [[nodiscard]] double unproved_half_length(const Eigen::VectorXd& turn,
+                                            search::Query& query) const;
 
   const scene::Levers& levers_;
 };

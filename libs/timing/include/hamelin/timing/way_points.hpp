@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 
 #include "hamelin/core/rng.hpp"
+#include "hamelin/dynamics/joint_box.hpp"
 #include "hamelin/search/query.hpp"
 #include "hamelin/timing/blended_path.hpp"
 #include "hamelin/timing/time_law.hpp"
@@ -37,6 +38,7 @@ class WayPoints {
   };
   [[nodiscard]] Change change(const Eigen::MatrixXd& from, Rng& rng);
   void keep_limits(Eigen::Index point);
+  [[nodiscard]] bool keep_constraints(const Change& changed, search::Query& query);
   void predict(const BlendedPath& now, const Change& changed, BlendedPath& out) const;
   [[nodiscard]] bool prove(BlendedPath& candidate, const Change& changed,
                            const search::Margins& margins, search::Query& query);
@@ -44,6 +46,7 @@ class WayPoints {
   TimeLaw law_;
   Blending blending_;
   Eigen::VectorXd q_lower_, q_upper_;
+  dynamics::JointBox box_;
   Eigen::MatrixXd trial_;
   double spread_ = 0.0;
 };

@@ -1,0 +1,53 @@
+#include "constraint_audit.hpp"
+
+#include <fmt/format.h>
+
+#include "hamelin/core/numbers.hpp"
+
+namespace hamelin::simulation {
+
+ConstraintAudit::ConstraintAudit(const scene::Scene& scene, const model::Model& model) {
+  for (const scene::Goal& goal : scene.goals) {
+    Goal& out = goals_.emplace_back();
+    if (goal.constraints.empty()) continue;
+    out.kept = std::make_unique<search::TipConstraints>(model, goal.constraints);
+    for (const scene::TipConstraint& constraint : goal.constraints)
+      out.figures.push_back({goals_.size(), out.figures.size() + 1,
+                             std::string(scene::type_name(constraint)), -infinity, 0.0});
+  }
+}
+
+// A motion between two nodes is taken to be straight in joint space.
+void ConstraintAudit::observe(const Eigen::VectorXd& q, double time_s) {
+  if (goal_ < goals_.size() && goals_[goal_].kept) {
+    Goal& goal = goals_[goal_];
+    by_.resize(goal.figures.size());
+    goal.kept->measure(goal.seen ? last_ : q, q, by_);
+    goal.seen = true;
+    for (std::size_t k = 0; k < by_.size(); ++k)
+      if (by_[k] > goal.figures[k].excess) {
+        goal.figures[k].excess = by_[k];
+        goal.figures[k].time_s = time_s;
+      }
+  }
+  last_ = q;
+}
+
+std::vector<log::Result::Constraint> ConstraintAudit::figures() const {
+  std::vector<log::Result::Constraint> out;
+  for (const Goal& goal : goals_)
+    if (goal.seen) out.insert(out.end(), goal.figures.begin(), goal.figures.end());
+  return out;
+}
+
+std::vector<std::string> ConstraintAudit::violations() const {
+  std::vector<std::string> out;
+  for (const log::Result::Constraint& each : figures())
+    if (each.excess > 0.0)
+      out.push_back(fmt::format("goal {}: constraint {} ({}) was exceeded by {:.3g} {} at {:.6g} s",
+                                each.goal, each.constraint, each.type, each.excess,
+                                each.type == "axis" ? "rad" : "m", each.time_s));
+  return out;
+}
+
+}  // namespace hamelin::simulation
