@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "hamelin/core/numbers.hpp"
 
@@ -49,13 +50,10 @@ double largest_angle(const Vector3d& a, const Vector3d& b, double bend) {
 }
 
 // The part of [low, high] in which configurations are left where they are.
-double inner_low(double low, double high) {
-  if (!std::isfinite(low)) return low;
-  return std::isfinite(high) ? low + 0.5 * (1.0 - inner_share) * (high - low) : low + inner_m;
-}
-double inner_high(double low, double high) {
-  if (!std::isfinite(high)) return high;
-  return std::isfinite(low) ? high - 0.5 * (1.0 - inner_share) * (high - low) : high - inner_m;
+std::pair<double, double> inner(double low, double high) {
+  const bool has_low = std::isfinite(low), has_high = std::isfinite(high);
+  const double rim = has_low && has_high ? 0.5 * (1.0 - inner_share) * (high - low) : inner_m;
+  return {has_low ? low + rim : low, has_high ? high - rim : high};
 }
 
 // About which a vector turns towards z, by its components.
@@ -253,8 +251,7 @@ void TipConstraints::add_rows(const Kept& kept, const Vector3d& value) {
     return;
   }
   for (Index i = 0; i < 3; ++i) {
-    const double low = inner_low(kept.plan_low[i], kept.plan_high[i]),
-                 high = inner_high(kept.plan_low[i], kept.plan_high[i]);
+    const auto [low, high] = inner(kept.plan_low[i], kept.plan_high[i]);
     const double by = value[i] < low ? low - value[i] : std::min(0.0, high - value[i]);
     if (by == 0.0) continue;
     rows_.row(row_count_).noalias() = kept.from_world.row(i) * J_.bottomRows<3>();
@@ -303,8 +300,7 @@ void TipConstraints::restrict(dynamics::TipTarget& target, const VectorXd& seed)
     }
     Vector3d value = kept.from_world * (target.position - kept.origin);
     for (Index i = 0; i < 3; ++i) {
-      const double low = inner_low(kept.plan_low[i], kept.plan_high[i]),
-                   high = inner_high(kept.plan_low[i], kept.plan_high[i]);
+      const auto [low, high] = inner(kept.plan_low[i], kept.plan_high[i]);
       value[i] = std::clamp(value[i], low, std::max(low, high));
       if (std::isfinite(low))
         target.tolerance_m = std::min(target.tolerance_m, low - kept.plan_low[i]);

@@ -69,6 +69,13 @@ dynamics::JointBox wide_box() {
   return {dof, VectorXd::Constant(dof, -2.5), VectorXd::Constant(dof, 2.5), 0.0};
 }
 
+search::Settings within(const dynamics::JointBox& box) {
+  search::Settings out;
+  out.q_lower = box.lower;
+  out.q_upper = box.upper;
+  return out;
+}
+
 }  // namespace
 
 TEST_CASE("what is proved of the tip holds at every place that is sampled, also beside the motion",
@@ -146,9 +153,7 @@ TEST_CASE("a path keeps what the tip has to keep, also where the straight one wo
   const model::Model arm(model::make_chain({static_cast<int>(dof)}));
   TipConstraints kept(arm, slanted());
   const dynamics::JointBox box = wide_box();
-  search::Settings settings;
-  settings.q_lower = box.lower;
-  settings.q_upper = box.upper;
+  search::Settings settings = within(box);
   settings.margin_m = 0.05;
   Rng rng(7);
   int found = 0, straight = 0;
@@ -179,9 +184,7 @@ TEST_CASE("a path keeps what the tip has to keep, also where the straight one wo
 TEST_CASE("starts and goals that a constraint excludes are named in one line", "[search]") {
   const model::Model arm(model::make_chain({static_cast<int>(dof)}));
   const dynamics::JointBox box = wide_box();
-  search::Settings settings;
-  settings.q_lower = box.lower;
-  settings.q_upper = box.upper;
+  search::Settings settings = within(box);
   settings.checks_max = 2000;
   Rng rng(8);
   VectorXd good = random(rng, 2.0), bad = random(rng, 2.0);
