@@ -95,4 +95,5 @@ def main():
               f"{max(angles):.2f} degrees")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "hamelin/scene/tip_constraint.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -110,7 +111,7 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
            fmt::format("{} of goal {} ({}): {} by {} {}", kept["constraint"].get<std::size_t>(),
                        kept["goal"].get<std::size_t>(), kept["type"].get<std::string>(),
                        excess > 0.0 ? "exceeded" : "kept", number(std::abs(excess)),
-                       kept["type"] == "axis" ? "rad" : "m"));
+                       scene::unit_of(kept["type"].get<std::string>())));
     }
   if (r.contains("torque_change"))
     line("torque",

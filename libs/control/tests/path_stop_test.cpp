@@ -5,6 +5,7 @@
 
 #include "guide/path_timing.hpp"
 #include "hamelin/control/preparation.hpp"
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/test/joint_space_world.hpp"
 
@@ -31,7 +32,7 @@ struct PathRig {
       for (Index i = 0; i < 4; ++i)
         points(j, i) = std::clamp(scene.start_q[j] + rng.uniform(-0.6, 0.6),
                                   settings.q_lower[j] + 0.05, settings.q_upper[j] - 0.05);
-    timing.begin(1);
+    timing.begin(1, infinity);
     timing.consider(points, search::Margins(0.01), world);
     return timing.make(world);
   }

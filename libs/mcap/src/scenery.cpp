@@ -121,7 +121,7 @@ std::optional<Json> Scenery::obstacles(std::uint64_t time_ns, double time_s) {
 
 std::optional<Entity> Scenery::goal_entity(std::uint64_t time_ns, std::size_t k,
                                            std::size_t index) const {
-  const scene::Goal& goal = scene_.goals[k];
+  const scene::Goal& goal = scene::options_of(scene_.goals[k]).front();
   const Color color = k < index ? reached_color : k == index ? current_color : later_color;
   const bool follows = goal.type == scene::GoalType::follow;
   Entity entity(time_ns, follows ? target_frame : world_frame, fmt::format("goal/{}", k));

@@ -62,10 +62,11 @@ void check_scene(const scene::Scene& scene, bool has_paths) {
       refuse_scene(scene, fmt::format("/goals/{}/may_touch: is given, expected none: optimised "
                                       "motions keep away from all obstacles",
                                       i));
-    if (!scene.goals[i].constraints.empty())
-      refuse_scene(scene, fmt::format("/goals/{}/constraints: are given, expected none: optimised "
-                                      "motions do not keep them",
-                                      i));
+    if (const auto& goal = scene.goals[i];
+        goal.way || goal.approach || goal.retreat || !goal.constraints.empty())
+      refuse_scene(scene, fmt::format("/goals/{}/{}: is given, expected none: optimised motions do "
+                                      "not keep it",
+                                      i, scene::path_need(goal)));
     if (type != scene::GoalType::joint && !has_paths)
       refuse_scene(scene,
                    fmt::format("/goals/{}: is a {}, expected joint positions, or a guide that "
@@ -204,9 +205,8 @@ SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& 
 bool uses_paths(const scene::Scene& scene) {
   return scene.guide.type == scene::GuideType::rrt_connect ||
          (scene.guide.type == scene::GuideType::on_request &&
-          std::any_of(scene.goals.begin(), scene.goals.end(), [](const scene::Goal& goal) {
-            return goal.type == scene::GoalType::position || goal.type == scene::GoalType::pose;
-          }));
+          std::any_of(scene.goals.begin(), scene.goals.end(),
+                      [](const scene::Goal& goal) { return goal.type != scene::GoalType::joint; }));
 }
 
 }  // namespace

@@ -38,7 +38,7 @@ from ._hamelin import (
     plugin_path,
 )
 from ._logs import Log, read_log
-from ._motions import Explanation, Motion, PathMotion, PathPlan, explain, optimize, plan
+from ._motions import Explanation, Motion, PathMotion, PathPlan, explain, optimize, plan, postures
 from ._pages import Page, report
 from ._robots import FitResult, fit_robot, robot_info
 from ._runs import Result, Verification, full_config, integrate, load_scene, run, verify
@@ -87,6 +87,7 @@ __all__ = [
     "optimize",
     "plan",
     "plan_sweep",
+    "postures",
     "plugin_path",
     "read_log",
     "report",

@@ -8,7 +8,7 @@ from typing import Any, Sequence
 import numpy as np
 
 from ._files import write_document
-from ._hamelin import _explain, _optimize, _plan
+from ._hamelin import _explain, _optimize, _plan, _postures
 from ._progress import Bar
 from ._runs import SceneLike, as_scene, overrides_of
 from ._types import Array, Document, DocumentMapping, PathLike, Progress
@@ -186,6 +186,28 @@ def plan(
         values.append(f"/planner/guide_options/checks_max={checks}")
     made = as_scene(scene, overrides_of(guide=guide, seed=seed, set=values))
     return PathPlan(_plan(made, motions))
+
+
+def postures(
+    scene: SceneLike,
+    goal: int = 0,
+    *,
+    count: int = 10,
+    apart: float = 0.1,
+    attempts: int = 1000,
+    set: str | Sequence[str] | None = None,  # noqa: A002 (the program's name)
+) -> dict[str, Any]:
+    """Configurations at a goal of a scene that touch nothing: many solutions of inverse
+    kinematics, without repeats.
+
+    goal: its index. count: how many, at most. apart: by how much they differ in some joint, at
+    least. attempts: from so many starts, at most about. Returns q, shape (N, n), their clearances
+    [m] and options, and how many starts were tried, reached the goal and were clear.
+    """
+    values = [set] if isinstance(set, str) else list(set or ())
+    made = as_scene(scene, overrides_of(set=values))
+    found: dict[str, Any] = _postures(made, goal, count, apart, attempts)
+    return found
 
 
 def optimize(

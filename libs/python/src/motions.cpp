@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
 #include "arguments.hpp"
@@ -23,6 +24,29 @@ py::object plan(const BoundScene& scene, bool motions) {
         scene.scene, {.motions = motions, .poll = [&interrupts] { interrupts.raise(); }});
   }
   return to_python(control::to_json(found));
+}
+
+py::dict postures(const BoundScene& scene, std::size_t goal, std::size_t count, double apart,
+                  long attempts) {
+  search::Postures found;
+  {
+    const py::gil_scoped_release unlocked;
+    found = control::find_postures(scene.scene, goal, {count, apart, attempts});
+  }
+  const auto n = static_cast<Eigen::Index>(found.found.size());
+  Eigen::MatrixXd q(n, n > 0 ? found.found.front().q.size() : 0);
+  Eigen::VectorXd clearance(n);
+  std::vector<std::size_t> options;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const search::Posture& each = found.found[static_cast<std::size_t>(i)];
+    q.row(i) = each.q.transpose();
+    clearance[i] = each.clearance_m;
+    options.push_back(each.goal);
+  }
+  const search::GoalFigures& figures = found.figures;
+  return py::dict(py::arg("q") = q, py::arg("clearance_m") = clearance, py::arg("option") = options,
+                  py::arg("tried") = figures.tried, py::arg("reached") = figures.reached,
+                  py::arg("clear") = figures.clear, py::arg("repeated") = found.repeated);
 }
 
 // The value of an option, within what `hamelin optimize` accepts.
@@ -112,6 +136,8 @@ py::tuple explain(py::handle log, int motions, std::uint64_t seed, const py::obj
 void add_motions(py::module_& module) {
   using py::arg;
   module.def("_plan", &plan, arg("scene"), arg("motions"), "The document of `hamelin plan`.");
+  module.def("_postures", &postures, arg("scene"), arg("goal"), arg("count"), arg("apart"),
+             arg("attempts"), "Clear configurations at a goal, and how many were tried.");
   module.def("_optimize", &optimize, arg("scene"), arg("options"),
              "The document of `hamelin optimize`, and whether the motion is valid.");
   module.def("_explain", &explain, arg("log"), arg("motions"), arg("seed"), arg("progress"),

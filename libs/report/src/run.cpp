@@ -139,10 +139,11 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
        has_trajectory = false;
   for (const auto& link : links)
     (link.joint.type == model::JointType::revolute ? has_revolute : has_prismatic) = true;
-  for (const auto& goal : world.goals) {
-    (goal.type == scene::GoalType::joint ? has_joint_goal : has_tip_goal) = true;
-    has_trajectory = has_trajectory || goal.trajectory;
-  }
+  for (const auto& goal : world.goals)
+    for (const auto& option : scene::options_of(goal)) {
+      (option.type == scene::GoalType::joint ? has_joint_goal : has_tip_goal) = true;
+      has_trajectory = has_trajectory || option.trajectory;
+    }
   const std::string suffix =
       plotted_joints_ < links.size() ? fmt::format(" (first {})", plotted_joints_) : "";
   std::size_t column = 0;
@@ -386,13 +387,16 @@ void Run::set_goal_distance(const Frame& frame) {
   double* const row = &row_[3 * plotted_joints_];
   const auto& goal = world_.goals[std::min(frame.goal_index, world_.goals.size() - 1)];
   if (goal.type == scene::GoalType::follow) return;  // the tick has the distance from its target
-  if (goal.type == scene::GoalType::joint) {
-    if (goal.q.size() == frame.q.size())
-      row[goal_rad] = (frame.q - goal.q).lpNorm<Eigen::Infinity>();
-    return;
-  }
   dynamics::forward_kinematics(world_.model, ws_, frame.q);
-  row[goal_m] = (dynamics::tip_pose(world_.model, ws_).p() - goal.pose.p()).norm();
+  const geometry::SE3 tip = dynamics::tip_pose(world_.model, ws_);
+  const auto nearer = [](double& least, double distance) {
+    if (!(least <= distance)) least = distance;
+  };
+  for (const scene::Goal& option : scene::options_of(goal))
+    if (option.type != scene::GoalType::joint)
+      nearer(row[goal_m], (tip.p() - scene::nearest_pose(option, tip).p()).norm());
+    else if (option.q.size() == frame.q.size())
+      nearer(row[goal_rad], (frame.q - option.q).lpNorm<Eigen::Infinity>());
 }
 
 Json Run::finish(const log::LogReader& reader, Container& container, RunSummary& summary) {
@@ -476,8 +480,9 @@ Json Run::marks(const Plot& plot) const {
   } else if (id == "goal" || id == "goal_joint") {
     const bool of_joints = plot.lines.front().second == 3 * plotted_joints_ + goal_rad;
     for (const auto& goal : world_.goals)
-      if ((goal.type == scene::GoalType::joint) == of_joints)
-        add(of_joints ? goal.tolerance_rad : goal.tolerance_m, "tolerance");
+      for (const auto& option : scene::options_of(goal))
+        if ((option.type == scene::GoalType::joint) == of_joints)
+          add(of_joints ? option.tolerance_rad : option.tolerance_m, "tolerance");
   } else if (id == "tau_share") {
     add(1.0, "limit");
     add(-1.0, "limit");

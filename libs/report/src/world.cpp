@@ -395,7 +395,7 @@ std::unique_ptr<World> make_world(const simulation::Recorded& recorded, std::str
   Json goals = Json::array(), obstacles = Json::array();
   for (const auto& goal : scene.goals)
     if (goal.type != scene::GoalType::follow)  // it has no place of its own
-      goals.push_back(goal_json(goal));
+      for (const auto& option : scene::options_of(goal)) goals.push_back(goal_json(option));
   for (const auto& obstacle : scene.obstacles)
     if (obstacle.shape != scene::Shape::frame)
       obstacles.push_back(obstacle_json(obstacle, scene.duration_s, container));

@@ -13,110 +13,13 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "read_scene.hpp"
+#include "reader.hpp"
 #include "rotation.hpp"
 #include "waypoint_file.hpp"
 
 namespace hamelin::scene {
 
 namespace {
-
-// Reads one JSON object that was already checked against the schema; null is the same as absent.
-class Reader {
- public:
-  Reader(const Json& object, std::string place) : object_(object), place_(std::move(place)) {}
-
-  [[nodiscard]] const Json* find(const char* key) const {
-    if (!object_.is_object()) return nullptr;
-    const auto it = object_.find(key);
-    return it == object_.end() || it->is_null() ? nullptr : &*it;
-  }
-  template <typename T>
-  [[nodiscard]] T get(const char* key, T fallback) const {
-    const Json* value = find(key);
-    return value != nullptr ? value->get<T>() : fallback;
-  }
-  template <typename T>
-  [[nodiscard]] std::optional<T> maybe(const char* key) const {
-    const Json* value = find(key);
-    return value != nullptr ? std::optional<T>(value->get<T>()) : std::nullopt;
-  }
-  [[nodiscard]] Reader child(const char* key) const {
-    static const Json nothing;
-    const Json* value = find(key);
-    return {value != nullptr ? *value : nothing, place_of(key)};
-  }
-  /// Calls `read` with each element of a list.
-  template <class Read>
-  void each(const char* key, const Read& read) const {
-    const Json* list = find(key);
-    for (std::size_t i = 0; list != nullptr && i < list->size(); ++i)
-      read(Reader((*list)[i], fmt::format("{}/{}", place_of(key), i)));
-  }
-  [[nodiscard]] const std::string& place() const noexcept { return place_; }
-  [[nodiscard]] std::string place_of(const char* key) const {
-    return fmt::format("{}/{}", place_, key);
-  }
-
-  [[nodiscard]] Eigen::Vector3d vector(const char* key, const Eigen::Vector3d& fallback) const {
-    const Json* value = find(key);
-    if (value == nullptr) return fallback;
-    return {(*value)[0].get<double>(), (*value)[1].get<double>(), (*value)[2].get<double>()};
-  }
-  [[nodiscard]] Eigen::VectorXd joints(const char* key) const {
-    if (const Json* value = find(key); value != nullptr)
-      for (std::size_t i = 0; i < value->size(); ++i)
-        if (!(*value)[i].is_number())
-          fail(fmt::format("{}/{}", key, i).c_str(),
-               "is a list, expected a number (way-points belong to a goal of type path)");
-    const auto values = get<std::vector<double>>(key, {});
-    return Eigen::Map<const Eigen::VectorXd>(values.data(),
-                                             static_cast<Eigen::Index>(values.size()));
-  }
-  // Way-points as columns.
-  [[nodiscard]] Eigen::MatrixXd joint_path(const char* key) const {
-    const Json& points = *find(key);
-    if (points.empty()) fail(key, "is empty, expected at least one way-point");
-    Eigen::MatrixXd path;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const std::string place = fmt::format("{}/{}", key, i);
-      if (!points[i].is_array() || points[i].empty())
-        fail(place.c_str(), "expected a way-point, a list of one number per joint");
-      const auto q = points[i].get<std::vector<double>>();
-      const auto size = static_cast<Eigen::Index>(q.size());
-      if (i == 0) path.resize(size, static_cast<Eigen::Index>(points.size()));
-      if (size != path.rows())
-        fail(place.c_str(), fmt::format("{} values given, expected {} as in the first way-point",
-                                        size, path.rows()));
-      path.col(static_cast<Eigen::Index>(i)) = Eigen::Map<const Eigen::VectorXd>(q.data(), size);
-    }
-    return path;
-  }
-  [[nodiscard]] Quaternion quaternion() const {
-    Quaternion c{1.0, 0.0, 0.0, 0.0};
-    if (const Json* value = find("quaternion_wxyz"); value != nullptr)
-      for (std::size_t i = 0; i < c.size(); ++i) c[i] = (*value)[i].get<double>();
-    const double norm = Eigen::Map<const Eigen::Vector4d>(c.data()).norm();
-    if (!(std::abs(norm - 1.0) <= 1e-3))
-      fail("quaternion_wxyz", fmt::format("the norm is {:.6g}, expected a unit quaternion", norm));
-    return c;
-  }
-  [[nodiscard]] geometry::SE3 pose() const {
-    return {rotation_of(quaternion()), vector("position_m", Eigen::Vector3d::Zero())};
-  }
-  [[noreturn]] void fail(const char* key, const std::string& message) const {
-    throw Error(ErrorCode::invalid, fmt::format("{}: {}", place_of(key), message));
-  }
-  void require(const char* key, std::string_view kind) const {
-    if (find(key) == nullptr) fail(key, fmt::format("is missing, expected for a {}", kind));
-  }
-  void refuse(const char* key, std::string_view kind) const {
-    if (find(key) != nullptr) fail(key, fmt::format("is not allowed for a {}", kind));
-  }
-
- private:
-  const Json& object_;
-  std::string place_;
-};
 
 Shape shape_of(const std::string& type) {
   for (const Shape shape : {Shape::box, Shape::cylinder, Shape::capsule, Shape::frame})
@@ -144,6 +47,8 @@ WaypointMotion read_waypoint_motion(const Reader& in, const std::filesystem::pat
   }
 }
 
+}  // namespace
+
 Motion read_motion(const Reader& in, const std::filesystem::path& folder) {
   const auto type = in.get<std::string>("type", "");
   const auto take = [&](std::string_view kind, const std::string& name,
@@ -167,6 +72,8 @@ Motion read_motion(const Reader& in, const std::filesystem::path& folder) {
   return LinearMotion{in.vector("velocity_m_s", Eigen::Vector3d::Zero()), in.get("start_s", 0.0),
                       in.get("duration_s", std::numeric_limits<double>::infinity())};
 }
+
+namespace {
 
 void read_prediction(const Reader& in, Obstacle& o) {
   const Json* given = in.find("prediction");
@@ -219,6 +126,8 @@ std::vector<Obstacle> read_obstacles(const Reader& in, const std::filesystem::pa
   return out;
 }
 
+}  // namespace
+
 std::vector<Box> read_boxes(const Reader& in, const char* key) {
   std::vector<Box> out;
   for (const auto& six : in.get<std::vector<std::vector<double>>>(key, {})) {
@@ -230,6 +139,8 @@ std::vector<Box> read_boxes(const Reader& in, const char* key) {
   }
   return out;
 }
+
+namespace {
 
 // Cameras may find obstacles that no scene names.
 void check_named(const Reader& in, const Scene& scene) {
@@ -253,179 +164,6 @@ MapChangeSpec read_map_change(const Reader& in, const std::filesystem::path& fol
   if (!change.file && change.free_m.empty() && change.occupied_m.empty())
     in.fail("file", "is missing, expected a file, free_boxes_m or occupied_boxes_m");
   return change;
-}
-
-Goal default_goal(GoalType type) {
-  const bool joint = type == GoalType::joint, position = type == GoalType::position;
-  Goal goal;
-  goal.type = type;
-  goal.tolerance_m = joint ? 0.0 : position ? 0.02 : 0.01;
-  goal.tolerance_rad = joint ? 0.05 : position ? 0.0 : type == GoalType::follow ? 0.1 : 0.26;
-  goal.speed_max = joint ? 0.05 : std::numeric_limits<double>::infinity();
-  return goal;
-}
-
-TargetStream read_target_stream(const Reader& in, const std::filesystem::path& folder) {
-  TargetStream stream;
-  if (const auto file = in.maybe<std::string>("file")) stream.file = resolve_path(folder, *file);
-  stream.gap_max_s = in.get("gap_max_s", stream.gap_max_s);
-  stream.jump_max_m = in.get("jump_max_m", stream.jump_max_m);
-  stream.jump_max_rad = in.get("jump_max_rad", stream.jump_max_rad);
-  stream.noise_m = in.get("noise_m", stream.noise_m);
-  stream.noise_rad = in.get("noise_rad", stream.noise_rad);
-  stream.leash_m = in.get("leash_m", stream.leash_m);
-  stream.leash_rad = in.get("leash_rad", stream.leash_rad);
-  if (in.get<std::string>("when_lost", "hold") == to_string(WhenLost::end))
-    stream.when_lost = WhenLost::end;
-  return stream;
-}
-
-// A target that moves by the scene has a place, unless its way-points have one.
-void read_target(const Reader& in, const std::filesystem::path& folder, Goal& goal) {
-  goal.position_only = in.get<std::string>("tracks", "pose") == "position";
-  if (in.find("motion") == nullptr) {
-    const std::string kind = "follow goal without a motion, whose target is streamed";
-    in.refuse("position_m", kind);
-    in.refuse("quaternion_wxyz", kind);
-    goal.stream = read_target_stream(in.child("stream"), folder);
-    return;
-  }
-  in.refuse("stream", "follow goal with a motion");
-  goal.motion = read_motion(in.child("motion"), folder);
-  check(*goal.motion, in.place_of("motion"));
-  if (std::holds_alternative<WaypointMotion>(*goal.motion)) return;
-  in.require("position_m", "follow goal with this motion");
-  if (!goal.position_only) in.require("quaternion_wxyz", "follow goal that tracks a pose");
-}
-
-GoalType goal_type_of(const std::string& type) {
-  if (type == "path" || type == "trajectory") return GoalType::joint;
-  for (const GoalType known : {GoalType::position, GoalType::pose, GoalType::follow})
-    if (type == to_string(known)) return known;
-  return GoalType::joint;
-}
-
-// One of the paths of a file that `hamelin plan` wrote: way-points as columns.
-Eigen::MatrixXd read_path_file(const std::filesystem::path& file, std::size_t index) {
-  const Json document = read_json(file);
-  check_shipped_schema(document, "path", file.string());
-  const Json& paths = document["paths"];
-  if (index >= paths.size() || paths[index]["q"].empty())
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: /paths/{}: has no way-points, expected a path that was found",
-                            file.string(), index));
-  return Reader(paths[index], fmt::format("{}: /paths/{}", file.string(), index)).joint_path("q");
-}
-
-// The motion of a goal of type trajectory, and its points as a path.
-void set_trajectory(Goal& goal, JointTrajectory trajectory) {
-  goal.path = trajectory.q;
-  goal.q = goal.path.rightCols(1);
-  goal.trajectory = std::move(trajectory);
-}
-
-void read_trajectory_of(const Reader& in, const std::filesystem::path& folder, Goal& goal) {
-  if (in.find("file") == nullptr) {
-    in.require("trajectory", "trajectory goal without a file");
-    set_trajectory(goal,
-                   joint_trajectory_from_json(*in.find("trajectory"), in.place_of("trajectory")));
-    return;
-  }
-  in.refuse("trajectory", "trajectory goal with a file");
-  goal.path_file = resolve_path(folder, in.get<std::string>("file", ""));
-  set_trajectory(goal, read_joint_trajectory(goal.path_file));
-}
-
-// A corner of a box; null: it has no end there.
-Eigen::Vector3d read_corner(const Reader& in, const char* key, double end) {
-  const Json* given = in.find(key);
-  Eigen::Vector3d out = Eigen::Vector3d::Constant(end);
-  for (std::size_t i = 0; given != nullptr && i < 3; ++i)
-    if (!(*given)[i].is_null()) out[static_cast<Eigen::Index>(i)] = (*given)[i].get<double>();
-  return out;
-}
-
-TipConstraint read_constraint(const Reader& in) {
-  const auto type = in.get<std::string>("type", "");
-  const std::string kind = "constraint of type " + type;
-  const bool is_axis = type == "axis";
-  for (const char* key : {"axis", "direction", "angle_rad"})
-    if (!is_axis) in.refuse(key, kind);
-  for (const char* key : {"position_m", "quaternion_wxyz", "low_m", "high_m"})
-    if (is_axis) in.refuse(key, kind);
-  TipConstraint out;
-  if (is_axis) {
-    in.require("angle_rad", kind);
-    const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-    out = AxisConstraint{in.vector("axis", up), in.vector("direction", up),
-                         in.get("angle_rad", 0.0)};
-  } else {
-    out = BoxConstraint{in.pose(), in.quaternion(), read_corner(in, "low_m", -infinity),
-                        read_corner(in, "high_m", infinity)};
-  }
-  check(out, in.place());
-  return out;
-}
-
-Goal read_goal(const Reader& in, const std::filesystem::path& folder) {
-  const auto type = in.get<std::string>("type", "");
-  const bool path = type == "path", trajectory = type == "trajectory";
-  Goal goal = default_goal(goal_type_of(type));
-  const bool joint = goal.type == GoalType::joint, pose = goal.type == GoalType::pose,
-             follow = goal.type == GoalType::follow;
-  const std::string kind = type + " goal";
-  const bool from_file = path && in.find("file") != nullptr;
-  joint && !from_file && !trajectory ? in.require("q", kind) : in.refuse("q", kind);
-  if (!path && !trajectory) in.refuse("file", kind);
-  if (!trajectory) in.refuse("trajectory", kind);
-  if (!from_file) in.refuse("index", kind);
-  if (!follow) {
-    joint ? in.refuse("position_m", kind) : in.require("position_m", kind);
-    pose ? in.require("quaternion_wxyz", kind) : in.refuse("quaternion_wxyz", kind);
-    for (const char* key : {"tracks", "motion", "stream"}) in.refuse(key, kind);
-  }
-  if (joint) in.refuse("tolerance_m", kind);
-  if (joint || follow) in.refuse("tip_speed_max_m_s", kind);
-  if (follow) in.refuse("speed_max", kind);
-  if (goal.type == GoalType::position) in.refuse("tolerance_rad", kind);
-  if (trajectory) {
-    read_trajectory_of(in, folder, goal);
-  } else if (from_file) {
-    goal.path_file = resolve_path(folder, in.get<std::string>("file", ""));
-    goal.path = read_path_file(goal.path_file, in.get<std::size_t>("index", 0));
-    goal.q = goal.path.rightCols(1);
-  } else if (path) {
-    goal.path = in.joint_path("q");
-    goal.q = goal.path.rightCols(1);
-  } else {
-    goal.q = in.joints("q");
-  }
-  goal.pose = in.pose();
-  goal.quaternion_wxyz = in.quaternion();
-  goal.tolerance_m = in.get("tolerance_m", goal.tolerance_m);
-  goal.tolerance_rad = in.get("tolerance_rad", goal.tolerance_rad);
-  goal.speed_max = in.get("speed_max", goal.speed_max);
-  goal.tip_speed_max_m_s = in.maybe<double>("tip_speed_max_m_s");
-  if (follow) read_target(in, folder, goal);
-  const Reader may_touch = in.child("may_touch");
-  goal.may_touch = {read_boxes(may_touch, "boxes_m"),
-                    may_touch.get<std::vector<std::string>>("obstacles", {})};
-  check(goal.may_touch, in.place_of("may_touch"));
-  in.each("constraints",
-          [&](const Reader& each) { goal.constraints.push_back(read_constraint(each)); });
-  return goal;
-}
-
-// A target is never reached, so no goal can come after it.
-std::vector<Goal> read_goals(const Reader& in, const std::filesystem::path& folder) {
-  std::vector<Goal> goals;
-  in.each("goals", [&](const Reader& goal) {
-    if (!goals.empty() && goals.back().type == GoalType::follow)
-      in.fail(fmt::format("goals/{}", goals.size() - 1).c_str(),
-              "is a follow goal, which is never reached, expected it as the last goal");
-    goals.push_back(read_goal(goal, folder));
-  });
-  return goals;
 }
 
 JointNumbers read_joint_numbers(const Reader& in, const char* key, JointNumbers fallback) {
@@ -782,44 +520,6 @@ std::vector<std::filesystem::path> input_files(const Scene& scene) {
   for (const Event& event : scene.events)
     if (event.map && event.map->file) files.push_back(*event.map->file);
   return files;
-}
-
-Goal joint_goal(Eigen::VectorXd q) {
-  Goal goal = default_goal(GoalType::joint);
-  goal.q = std::move(q);
-  return goal;
-}
-
-Goal trajectory_goal(JointTrajectory trajectory) {
-  check(trajectory, "trajectory");
-  Goal goal = default_goal(GoalType::joint);
-  set_trajectory(goal, std::move(trajectory));
-  return goal;
-}
-
-Goal trajectory_goal(const std::filesystem::path& file) {
-  Goal goal = trajectory_goal(read_joint_trajectory(file));
-  goal.path_file = file;
-  return goal;
-}
-
-Goal position_goal(const Eigen::Vector3d& position_m) {
-  Goal goal = default_goal(GoalType::position);
-  goal.pose = {Eigen::Matrix3d::Identity(), position_m};
-  return goal;
-}
-
-Goal pose_goal(const geometry::SE3& pose) {
-  Goal goal = default_goal(GoalType::pose);
-  goal.pose = pose;
-  return goal;
-}
-
-Goal follow_goal(bool position_only, const TargetStream& stream) {
-  Goal goal = default_goal(GoalType::follow);
-  goal.position_only = position_only;
-  goal.stream = stream;
-  return goal;
 }
 
 std::filesystem::path target_file(const Goal& goal) {

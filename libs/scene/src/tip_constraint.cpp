@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/numbers.hpp"
 
 namespace hamelin::scene {
 
@@ -35,7 +37,20 @@ Json numbers(const Eigen::Vector3d& p) {
 }  // namespace
 
 std::string_view type_name(const TipConstraint& constraint) noexcept {
+  if (std::holds_alternative<SpeedConstraint>(constraint)) return "speed";
   return std::holds_alternative<AxisConstraint>(constraint) ? "axis" : "box";
+}
+
+std::string_view unit_of(std::string_view type) noexcept {
+  return type == "axis" ? "rad" : type == "speed" ? "m/s" : "m";
+}
+
+double speed_max_m_s(const std::vector<TipConstraint>& constraints) noexcept {
+  double most = infinity;
+  for (const TipConstraint& constraint : constraints)
+    if (const auto* speed = std::get_if<SpeedConstraint>(&constraint))
+      most = std::min(most, speed->m_s);
+  return most;
 }
 
 void check(const TipConstraint& constraint, const std::string& where) {
@@ -45,6 +60,11 @@ void check(const TipConstraint& constraint, const std::string& where) {
     if (!(axis->angle_rad > 0.0 && axis->angle_rad <= angle_max_rad))
       fail(where + ": angle_rad", fmt::format("{} given, expected a number above 0, at most {}",
                                               axis->angle_rad, angle_max_rad));
+    return;
+  }
+  if (const auto* speed = std::get_if<SpeedConstraint>(&constraint)) {
+    if (!(speed->m_s > 0.0 && std::isfinite(speed->m_s)))
+      fail(where + ": speed_m_s", fmt::format("{} given, expected a number above 0", speed->m_s));
     return;
   }
   const auto& box = std::get<BoxConstraint>(constraint);
@@ -62,6 +82,8 @@ Json to_json(const TipConstraint& constraint) {
             {"axis", numbers(axis->axis)},
             {"direction", numbers(axis->direction)},
             {"angle_rad", axis->angle_rad}};
+  if (const auto* speed = std::get_if<SpeedConstraint>(&constraint))
+    return {{"type", "speed"}, {"speed_m_s", speed->m_s}};
   const auto& box = std::get<BoxConstraint>(constraint);
   return {{"type", "box"},
           {"position_m", numbers(box.pose.p())},

@@ -1,33 +1,12 @@
-#include <Eigen/Geometry>
 #include <cmath>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/scene/scene.hpp"
-#include "rotation.hpp"
+#include "writer.hpp"
 
 namespace hamelin::scene {
 
 namespace {
-
-Json array(const Eigen::Ref<const Eigen::VectorXd>& v) {
-  return std::vector<double>(v.data(), v.data() + v.size());
-}
-
-Json quaternion_json(const Eigen::Matrix3d& R, const Quaternion& written) {
-  if (rotation_of(written) == R) return written;
-  Eigen::Quaterniond q(R);
-  if (q.w() < 0.0) q.coeffs() = -q.coeffs();
-  return {q.w(), q.x(), q.y(), q.z()};
-}
-
-template <typename T>
-Json or_null(const std::optional<T>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-Json pose_json(const geometry::SE3& pose, const Quaternion& written) {
-  return {{"position_m", array(pose.p())}, {"quaternion_wxyz", quaternion_json(pose.R(), written)}};
-}
 
 Json choice_json(const Choice& choice) {
   return {{"name", choice.name}, {"params", choice.params}};
@@ -51,59 +30,6 @@ Json boxes_json(const std::vector<Box>& boxes) {
   for (const Box& box : boxes)
     list.push_back({box.lo.x(), box.lo.y(), box.lo.z(), box.hi.x(), box.hi.y(), box.hi.z()});
   return list;
-}
-
-Json follow_json(const Goal& goal) {
-  Json out{{"type", type_name(goal)},
-           {"tracks", goal.position_only ? "position" : "pose"},
-           {"tolerance_m", goal.tolerance_m},
-           {"tolerance_rad", goal.tolerance_rad}};
-  if (goal.motion) {
-    out.update(pose_json(goal.pose, goal.quaternion_wxyz));
-    out["motion"] = motion_json(*goal.motion);
-    return out;
-  }
-  const TargetStream& stream = goal.stream;
-  out["stream"] = {{"file", stream.file.empty() ? Json(nullptr) : Json(stream.file.string())},
-                   {"gap_max_s", stream.gap_max_s},
-                   {"jump_max_m", stream.jump_max_m},
-                   {"jump_max_rad", stream.jump_max_rad},
-                   {"noise_m", stream.noise_m},
-                   {"noise_rad", stream.noise_rad},
-                   {"leash_m", stream.leash_m},
-                   {"leash_rad", stream.leash_rad},
-                   {"when_lost", to_string(stream.when_lost)}};
-  return out;
-}
-
-Json goal_to_reach_json(const Goal& goal) {
-  Json out{{"type", type_name(goal)}};
-  if (goal.trajectory) {
-    out["trajectory"] = to_json(*goal.trajectory);
-  } else if (goal.path.size() > 0) {
-    out["q"] = Json::array();
-    for (Eigen::Index i = 0; i < goal.path.cols(); ++i) out["q"].push_back(array(goal.path.col(i)));
-  } else if (goal.type == GoalType::joint) {
-    out["q"] = array(goal.q);
-  } else {
-    out["position_m"] = array(goal.pose.p());
-    if (goal.type == GoalType::pose)
-      out["quaternion_wxyz"] = quaternion_json(goal.pose.R(), goal.quaternion_wxyz);
-    out["tolerance_m"] = goal.tolerance_m;
-  }
-  if (goal.type != GoalType::position) out["tolerance_rad"] = goal.tolerance_rad;
-  out["speed_max"] = std::isfinite(goal.speed_max) ? Json(goal.speed_max) : Json(nullptr);
-  if (goal.type != GoalType::joint) out["tip_speed_max_m_s"] = or_null(goal.tip_speed_max_m_s);
-  return out;
-}
-
-Json goal_json(const Goal& goal) {
-  Json out = goal.type == GoalType::follow ? follow_json(goal) : goal_to_reach_json(goal);
-  out["may_touch"] = to_json(goal.may_touch);
-  out["constraints"] = Json::array();
-  for (const TipConstraint& constraint : goal.constraints)
-    out["constraints"].push_back(to_json(constraint));
-  return out;
 }
 
 Json change_json(const MapChangeSpec& change) {
@@ -250,29 +176,6 @@ Json start_json(const Scene& scene) {
 }
 
 }  // namespace
-
-std::string_view to_string(GoalType type) noexcept {
-  switch (type) {
-    case GoalType::joint:
-      return "joint";
-    case GoalType::position:
-      return "position";
-    case GoalType::pose:
-      return "pose";
-    case GoalType::follow:
-      return "follow";
-  }
-  return "unknown";
-}
-
-std::string_view to_string(WhenLost when) noexcept {
-  return when == WhenLost::end ? "end" : "hold";
-}
-
-std::string_view type_name(const Goal& goal) noexcept {
-  if (goal.trajectory) return "trajectory";
-  return goal.path.size() > 0 ? "path" : to_string(goal.type);
-}
 
 std::string_view to_string(ActuationType type) noexcept {
   switch (type) {

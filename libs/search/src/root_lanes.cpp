@@ -77,9 +77,14 @@ void RootLanes::set_targets(const Targets& targets) {
   to_floats(tip.R().col(2), out.tip_z);
   out.tip_link = model_.robot().tip.link;
   out.turns = first.turns;
-  out.reach_m = static_cast<float>(std::max(reach_share * first.tolerance_m, reach_least_m));
+  double metres = first.tolerance_m, radians = first.tolerance_rad;
+  for (const dynamics::TipTarget& target : targets) {
+    metres = std::min(metres, target.tolerance_m);
+    radians = std::min(radians, target.tolerance_rad);
+  }
+  out.reach_m = static_cast<float>(std::max(reach_share * metres, reach_least_m));
   out.reach_sine = static_cast<float>(
-      std::sin(std::clamp(reach_share * first.tolerance_rad, reach_least_rad, reach_most_rad)));
+      std::sin(std::clamp(reach_share * radians, reach_least_rad, reach_most_rad)));
 }
 
 double RootLanes::factor(Index joint) const {

@@ -20,7 +20,7 @@ class RootLanes {
 
   /// Whether the lanes have room for the arm and its joint limits.
   [[nodiscard]] bool fits() const noexcept { return fits_; }
-  /// @param targets in the world, all with the tolerances and `turns` of the first
+  /// @param targets in the world, all with `turns` of the first; near is what is near for all
   /// @param q dof × lanes, in the box
   void begin(const Targets& targets, const Eigen::MatrixXd& q);
   /// Moves all postures by so many steps. @return bits of those that came near to their targets

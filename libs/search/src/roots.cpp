@@ -1,9 +1,14 @@
 #include "roots.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <bit>
+#include <cmath>
+#include <numbers>
 
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/search/joint_metric.hpp"
 
 namespace hamelin::search {
@@ -38,17 +43,39 @@ dynamics::TipTarget draw_near(const dynamics::TipTarget& target, Rng& rng) {
   return out;
 }
 
-dynamics::TipTarget tip_target(const scene::Goal& goal) {
+// @param pose one of those that the goal leaves open
+dynamics::TipTarget tip_target(const scene::Goal& goal, const geometry::SE3& pose) {
   dynamics::TipTarget out;
-  out.position = goal.pose.p();
-  out.rotation = goal.pose.R();
+  out.position = pose.p();
+  out.rotation = pose.R();
   out.turns = goal.type == scene::GoalType::pose;
   out.tolerance_m = goal.tolerance_m;
   if (out.turns) out.tolerance_rad = goal.tolerance_rad;
   return out;
 }
 
+geometry::SE3 draw_pose(const scene::Goal& goal, Rng& rng) {
+  if (!scene::is_region(goal)) return goal.pose;
+  Vector3d at = goal.low_m;
+  for (int i = 0; i < 3; ++i)
+    if (goal.high_m[i] > at[i]) at[i] = rng.uniform(at[i], goal.high_m[i]);
+  Eigen::Matrix3d R = goal.pose.R();
+  if (goal.free_axis)
+    R = R * Eigen::AngleAxisd(rng.uniform(-std::numbers::pi, std::numbers::pi), *goal.free_axis);
+  return {R, goal.pose.p() + goal.pose.R() * at};
+}
+
 }  // namespace
+
+std::string why_not(const GoalFigures& goal) {
+  if (goal.tried == 0) return "not tried: another was reached before";
+  if (goal.reached == 0) return fmt::format("no posture reaches it ({} tried)", goal.tried);
+  if (goal.exceeding == goal.reached) return "all postures exceed a constraint of the tip";
+  if (goal.clear == 0) return fmt::format("all {} postures are in contact", goal.reached);
+  if (goal.blocked == goal.clear)
+    return fmt::format("the approaches of {} clear postures are blocked", goal.clear);
+  return "another was reached first";
+}
 
 Roots::Roots(const model::Model& model, const dynamics::JointBox& box, const Settings& settings,
              const VectorXd& weights)
@@ -64,15 +91,35 @@ Roots::Roots(const model::Model& model, const dynamics::JointBox& box, const Set
 
 void Roots::begin(const Problem& problem) {
   problem_ = &problem;
-  attempts_ = rounds_ = next_ = ordered_ = steps_ = 0;
-  checks_ = 0;
-  goal_ = 0;
+  rounds_ = next_ = ordered_ = steps_ = 0;
+  attempts_ = checks_ = batches_ = 0;
+  joint_ = tip_ = 0;
   excess_.reset();
   found_.assign(problem.goals.size(), 0);
+  figures_.assign(problem.goals.size(), {});
+  order_goals();
+}
+
+void Roots::order_goals() {
+  const std::vector<scene::Goal>& goals = problem_->goals;
+  dynamics::forward_kinematics(model_, ws_, problem_->start);
+  start_tip_ = dynamics::tip_pose(model_, ws_);
+  joints_.clear();
+  tips_.clear();
+  std::vector<double> apart(goals.size());
+  for (std::size_t i = 0; i < goals.size(); ++i) {
+    (goals[i].type == scene::GoalType::joint ? joints_ : tips_).push_back(i);
+    apart[i] = (scene::nearest_pose(goals[i], start_tip_).p() - start_tip_.p()).norm();
+  }
+  const auto turns = [&](std::size_t i) { return goals[i].type == scene::GoalType::pose; };
+  std::stable_sort(tips_.begin(), tips_.end(), [&](std::size_t a, std::size_t b) {
+    return turns(a) != turns(b) ? turns(a) : apart[a] < apart[b];
+  });
+  poses_ = static_cast<std::size_t>(std::count_if(tips_.begin(), tips_.end(), turns));
 }
 
 bool Roots::tries(std::size_t roots) const noexcept {
-  const auto goals = static_cast<int>(problem_->goals.size());
+  const auto goals = static_cast<long>(problem_->goals.size());
   if (std::all_of(found_.begin(), found_.end(), [](char found) { return found != 0; }))
     return false;
   return roots < roots_max * problem_->goals.size() &&
@@ -85,7 +132,7 @@ bool Roots::take(const VectorXd& q, Query& query, Root& root) {
     if (!reaches(goal, q) || !keeps(query, q)) continue;
     const bool joint = goal.type == scene::GoalType::joint;
     const double least = std::max(1e-6, joint ? settings_.least_m : settings_.root_clearance_m);
-    root = {q, query.clearance(q, least)};
+    root = {q, query.clearance(q, least), i};
     if (root.clearance < least) return false;
     if (joint) found_[i] = 1;
     return true;
@@ -98,9 +145,10 @@ bool Roots::reaches(const scene::Goal& goal, const VectorXd& q) {
     return (q - goal.q).lpNorm<Eigen::Infinity>() < goal.tolerance_rad;
   dynamics::forward_kinematics(model_, ws_, q);
   const geometry::SE3 tip = dynamics::tip_pose(model_, ws_);
-  return (tip.p() - goal.pose.p()).norm() < goal.tolerance_m &&
+  const geometry::SE3 wanted = scene::nearest_pose(goal, tip);
+  return (tip.p() - wanted.p()).norm() < goal.tolerance_m &&
          (goal.type != scene::GoalType::pose ||
-          Eigen::AngleAxisd(goal.pose.R().transpose() * tip.R()).angle() < goal.tolerance_rad);
+          Eigen::AngleAxisd(wanted.R().transpose() * tip.R()).angle() < goal.tolerance_rad);
 }
 
 bool Roots::keeps(Query& query, const VectorXd& q) {
@@ -119,42 +167,69 @@ bool Roots::attempt(Query& query, Rng& rng, Root& root) {
   return next_ < ordered_ ? at_tip(query, root) : at_next_goal(query, rng, root);
 }
 
+// All joint goals have their turn, then a batch of those of the tip.
 bool Roots::at_next_goal(Query& query, Rng& rng, Root& root) {
-  const std::size_t which = goal_;
-  const scene::Goal& goal = problem_->goals[which];
-  const bool joint = goal.type == scene::GoalType::joint;
   bool found = false;
-  if (joint && found_[which] == 0) {
-    found = at_joints(goal, query, rng, root);
-    found_[which] = found ? 1 : 0;
+  if (joint_ < joints_.size()) {
+    found = found_[joints_[joint_]] == 0 && at_joints(query, rng, root);
+    ++attempts_;
+    ++joint_;
+  } else if (!tips_.empty()) {
+    begin_batch(query, rng);
+    attempts_ += kernel::lanes;
   }
-  if (!joint) begin_batch(goal, query, rng);
-  batch_goal_ = which;
-  attempts_ += joint ? 1 : kernel::lanes;
-  if (++goal_ == problem_->goals.size()) {
-    goal_ = 0;
+  if (joint_ == joints_.size() && (tips_.empty() || in_batch())) {
+    joint_ = 0;
     ++rounds_;
   }
   return found;
 }
 
-bool Roots::at_joints(const scene::Goal& goal, Query& query, Rng& rng, Root& root) {
+bool Roots::at_joints(Query& query, Rng& rng, Root& root) {
+  root.goal = joints_[joint_];
+  const scene::Goal& goal = problem_->goals[root.goal];
+  GoalFigures& figures = figures_[root.goal];
   root.q = goal.q;
   if (rounds_ > 0)  // the goal itself is not clear, but a place within its tolerance may be
     for (double& x : root.q)
       x += joint_tolerance_share * goal.tolerance_rad * rng.uniform(-1.0, 1.0);
-  if (!keeps(query, root.q)) return false;
+  ++figures.tried;
+  ++figures.reached;
+  if (!keeps(query, root.q)) {
+    ++figures.exceeding;
+    return false;
+  }
   root.clearance = query.clearance(root.q, settings_.least_m);
-  return root.clearance > 0.0 && root.clearance >= settings_.least_m;
+  const bool clear = root.clearance > 0.0 && root.clearance >= settings_.least_m;
+  found_[root.goal] = clear ? 1 : 0;
+  figures.clear += clear ? 1 : 0;
+  return clear;
 }
 
-// The first posture of all is the start, with the goal itself as its target.
-void Roots::begin_batch(const scene::Goal& goal, Query& query, Rng& rng) {
-  const dynamics::TipTarget target = tip_target(goal);
+// The lanes of a batch take turns at goals of one kind.
+void Roots::choose_goals() {
+  const bool turns = tip_ < poses_;
+  const std::size_t first = turns ? 0 : poses_, end = turns ? poses_ : tips_.size();
+  for (std::size_t& goal : lane_goals_) {
+    goal = tips_[tip_];
+    if (++tip_ == end) tip_ = first;
+  }
+  const bool both = poses_ > 0 && poses_ < tips_.size();
+  if (both) tip_ = turns ? poses_ : 0;
+}
+
+// The first posture of each goal is the start, with the place of the goal that is nearest to it as
+// its target.
+void Roots::begin_batch(Query& query, Rng& rng) {
+  choose_goals();
+  ++batches_;
   for (int l = 0; l < kernel::lanes; ++l) {
-    const bool first = rounds_ == 0 && l == 0;
-    dynamics::TipTarget& drawn = targets_[static_cast<std::size_t>(l)];
-    drawn = first ? target : draw_near(target, rng);
+    const auto lane = static_cast<std::size_t>(l);
+    const scene::Goal& goal = problem_->goals[lane_goals_[lane]];
+    const bool first = figures_[lane_goals_[lane]].tried++ == 0;
+    dynamics::TipTarget& drawn = targets_[lane];
+    drawn = first ? tip_target(goal, scene::nearest_pose(goal, start_tip_))
+                  : draw_near(tip_target(goal, draw_pose(goal, rng)), rng);
     box_.draw(rng, sample_);
     if (first) sample_ = problem_->start.cwiseMax(box_.lower).cwiseMin(box_.upper);
     if (query.constraints() != nullptr) restrict(*query.constraints(), drawn);
@@ -199,25 +274,34 @@ void Roots::order_batch(unsigned near) {
 }
 
 // Most attempts look for places with all the clearance that is asked for, the last quarter for any
-// that a path may end at.
+// that a path may end at. Where there are many goals, fewer attempts are made at each.
 double Roots::least_clearance() const noexcept {
-  const int quarter = 4 * (rounds_ - 1) * kernel::lanes / attempts_max;
+  const double before = static_cast<double>((batches_ - 1) * kernel::lanes),
+               all = attempts_max * std::sqrt(static_cast<double>(tips_.size()));
+  const long quarter = static_cast<long>(4.0 * before / all);
   if (quarter < 2) return settings_.root_clearance_m;
   return quarter == 2 ? 0.5 * (settings_.root_clearance_m + settings_.least_m) : settings_.least_m;
 }
 
 bool Roots::at_tip(Query& query, Root& root) {
   const int lane = order_[static_cast<std::size_t>(next_++)];
+  root.goal = lane_goals_[static_cast<std::size_t>(lane)];
+  GoalFigures& figures = figures_[root.goal];
   ++checks_;
   sample_ = q_.col(lane);
   if (!kinematics_.solve(targets_[static_cast<std::size_t>(lane)], sample_)) return false;
-  if (query.constraints() != nullptr &&
-      (!keeps(query, sample_) || !reaches(problem_->goals[batch_goal_], sample_)))
+  if (query.constraints() != nullptr && !reaches(problem_->goals[root.goal], sample_)) return false;
+  ++figures.reached;
+  if (!keeps(query, sample_)) {
+    ++figures.exceeding;
     return false;
+  }
   const double least = std::max(1e-6, least_clearance());
   root.q = sample_;
   root.clearance = query.clearance(root.q, least);
-  return root.clearance >= least;
+  const bool clear = root.clearance >= least;
+  figures.clear += clear ? 1 : 0;
+  return clear;
 }
 
 }  // namespace hamelin::search

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "hamelin/search/joint_metric.hpp"
+#include "hamelin/search/ways.hpp"
+#include "search_input.hpp"
 
 namespace hamelin::search {
 
@@ -20,7 +22,6 @@ namespace {
 // soon leads away from a tight start: planners keep their margin there.
 constexpr double near_goal = 0.2, far_goal = 0.9, near_start = 0.02, far_start = 0.3;
 constexpr double start_slack_m = 2e-4;  // by which the clearance of the start may be undercut
-constexpr double limit_reserve = 1e-3;  // kept from joint limits [rad or m]
 constexpr double range = 0.5;           // the longest edge by which a tree grows
 // The same where the tip keeps constraints, and what a step gains at least, as a share.
 constexpr double constrained_range = 0.25, least_progress = 0.2;
@@ -41,10 +42,13 @@ constexpr std::array<Attempt, 3> attempts{{{1.0, 0.005}, {0.5, 0.05}, {0.1, 1.0}
 
 Search::Run::Run(const model::Model& model, const Settings& settings)
     : settings_(settings),
+      model_(model),
+      ws_(model),
       weights_(joint_weights(model)),
-      box_(model.dof(), settings.q_lower, settings.q_upper, limit_reserve),
+      box_(joint_box(model, settings)),
       bounds_(box_),
       finder_(model, box_, settings_, weights_),
+      follower_(model, box_),
       shortening_(model.dof()),
       from_start_(weights_, nodes),
       from_goal_(weights_, nodes),
@@ -56,8 +60,9 @@ void Search::Run::begin(const Problem& problem, Query& query) {
   problem_ = problem;
   query_ = &query;
   before_ = query.checks();
+  followed_ = -follower_.checks();
   path_ = {};
-  rng_ = Rng(settings_.seed + 0x632be59bd9b4e019ULL * (problem.number + 1));
+  rng_ = rng_of(settings_, problem);
   roots_.clear();
   from_start_.clear();
   from_goal_.clear();
@@ -65,8 +70,10 @@ void Search::Run::begin(const Problem& problem, Query& query) {
   asked_ = knows_ = follows_known_ = false;
   tries_known_ = problem_.known.cols() > 0;
   bounds_ = box_;
+  head_ = problem_.start;
+  blocked_.clear();
   finder_.begin(problem_);
-  phase_ = Phase::first_root;
+  phase_ = problem_.way ? Phase::follow_way : Phase::first_root;
   start_clearance_ = query.clearance(problem_.start, -1.0);
   if (start_clearance_ <= 0.0) return end("the arm is in contact where it is");
   const double self = query.self_clearance(problem_.start, settings_.self_margin_m + start_slack_m);
@@ -79,6 +86,7 @@ void Search::Run::begin(const Problem& problem, Query& query) {
   }
   bounds_.lower = bounds_.lower.cwiseMin(problem_.start);
   bounds_.upper = bounds_.upper.cwiseMax(problem_.start);
+  if (problem_.retreat && !retreat()) end("the retreat is " + blocked_);
 }
 
 bool Search::Run::advance(long checks) {
@@ -101,12 +109,14 @@ void Search::Run::ask(const VectorXd& a, const VectorXd& b) {
 
 void Search::Run::step() {
   switch (phase_) {
+    case Phase::follow_way:
+      return follow_way();
     case Phase::first_root:
       return find_first_root();
     case Phase::more_roots:
       return find_more_roots();
     case Phase::straight:
-      return ask(problem_.start, roots_[tried_].q);
+      return ask(head_.rightCols<1>(), roots_[tried_].tail.rightCols<1>());
     case Phase::known_ahead:
     case Phase::known_back:
       return follow_known();
@@ -143,6 +153,7 @@ void Search::Run::take_answer(bool clear) {
     case Phase::improve:
       if (shortening_.answer(clear)) ask(shortening_.from(), shortening_.to());
       return;
+    case Phase::follow_way:
     case Phase::first_root:
     case Phase::more_roots:
     case Phase::ended:
@@ -160,22 +171,79 @@ void Search::Run::find_first_root() {
     if (!finder_.tries(0)) return end(no_root());
     if (!finder_.attempt(*query_, rng_, root)) return;
   }
-  add_root(root);
-  from_start_.add(problem_.start, -1);
+  if (!add_root(root)) return;
+  add_chain(head_, from_start_);
   phase_ = Phase::straight;
 }
 
 std::string Search::Run::no_root() const {
   if (const auto& excess = finder_.excess(); excess && excess->by > 0.0)
     return "at the goal, " + constraints_->describe(*excess);
-  return "no clear configuration was found at the goal";
+  if (!blocked_.empty()) return "the approach to the goal is " + blocked_;
+  if (problem_.goals.size() == 1) return "no clear configuration was found at the goal";
+  return fmt::format("no clear configuration was found at any of {} goals", problem_.goals.size());
 }
 
-void Search::Run::add_root(const Root& root) {
+bool Search::Run::add_root(Root root) {
   roots_.push_back(root);
-  bounds_.lower = bounds_.lower.cwiseMin(root.q);
-  bounds_.upper = bounds_.upper.cwiseMax(root.q);
   set_margins();
+  if (!approach(roots_.back())) {
+    finder_.reject(root);
+    roots_.pop_back();
+    knows_ = false;
+    if (!roots_.empty()) set_margins();
+    return false;
+  }
+  bounds_.lower = bounds_.lower.cwiseMin(roots_.back().tail.rowwise().minCoeff());
+  bounds_.upper = bounds_.upper.cwiseMax(roots_.back().tail.rowwise().maxCoeff());
+  return true;
+}
+
+// A tail is proved to keep what is kept near its root, with the margins of the first attempt.
+bool Search::Run::approach(Root& root) {
+  root.tail = root.q;
+  const std::optional<scene::Stretch>& stretch = problem_.goals[root.goal].approach;
+  if (!stretch) return true;
+  dynamics::forward_kinematics(model_, ws_, root.q);
+  const TipCurve curve = approach_curve(*stretch, dynamics::tip_pose(model_, ws_));
+  FollowedWay found = follower_.follow(curve, stretch->tolerance, root.q, *query_, rng_);
+  blocked_ = std::move(found.cause);
+  root.tail = std::move(found.points);
+  return found.share >= 1.0;
+}
+
+bool Search::Run::retreat() {
+  dynamics::forward_kinematics(model_, ws_, problem_.start);
+  const TipCurve curve = retreat_curve(*problem_.retreat, dynamics::tip_pose(model_, ws_));
+  for (attempt_ = 0; attempt_ < attempts.size(); ++attempt_) {
+    set_margins();
+    FollowedWay found =
+        follower_.follow(curve, problem_.retreat->tolerance, problem_.start, *query_, rng_);
+    head_ = std::move(found.points);
+    blocked_ = std::move(found.cause);
+    if (found.share >= 1.0) return true;
+  }
+  return false;
+}
+
+void Search::Run::follow_way() {
+  FollowedWay best;
+  for (attempt_ = 0; attempt_ < attempts.size() && best.share < 1.0; ++attempt_) {
+    set_margins();
+    FollowedWay found = follower_.follow(*problem_.way, problem_.goals.front().way->tolerance,
+                                         problem_.start, *query_, rng_);
+    if (attempt_ == 0 || found.share > best.share) best = std::move(found);
+  }
+  path_.way_share = best.share;
+  if (best.share >= 1.0) return found_first(best.points);
+  path_.way = std::move(best.points);
+  end("the way is " + best.cause);
+}
+
+int Search::Run::add_chain(const MatrixXd& points, Tree& tree) {
+  int node = -1;
+  for (Index i = 0; i < points.cols(); ++i) node = tree.add(points.col(i), node);
+  return node;
 }
 
 void Search::Run::set_margins() {
@@ -195,11 +263,11 @@ void Search::Run::set_margins() {
 void Search::Run::take_straight(bool clear) {
   const Root& root = roots_[tried_++];
   if (clear) {
-    MatrixXd points(root.q.size(), 2);
-    points << problem_.start, root.q;
+    MatrixXd points(root.q.size(), head_.cols() + root.tail.cols());
+    points << head_, root.tail.rowwise().reverse();
     return found_first(points);
   }
-  from_goal_.add(root.q, -1);
+  add_chain(root.tail, from_goal_);
   if (tried_ == roots_.size()) begin_growing();
 }
 
@@ -249,8 +317,7 @@ void Search::Run::take_known(bool clear) {
 void Search::Run::find_more_roots() {
   Root root;
   if (finder_.attempt(*query_, rng_, root)) {
-    add_root(root);
-    phase_ = Phase::straight;
+    if (add_root(root)) phase_ = Phase::straight;
   } else if (!finder_.in_batch()) {
     next_root_ = used() + root_checks;
     phase_ = Phase::grow;
@@ -357,6 +424,7 @@ void Search::Run::join(int in_start, int in_goal) {
 void Search::Run::found_first(const MatrixXd& points) {
   path_.planned = points;
   path_.first_checks = used();
+  if (!problem_.shortens || problem_.way) return finish(points);
   shortening_.begin(points);
   phase_ = Phase::shorten;
 }
@@ -371,7 +439,8 @@ void Search::Run::shorten() {
 }
 
 void Search::Run::improve() {
-  if (used() >= improve_until_ || shortening_.points().cols() <= 2) return finish();
+  if (used() >= improve_until_ || shortening_.points().cols() <= 2)
+    return finish(shortening_.points());
   if (shortening_.propose(rng_))
     ask(shortening_.from(), shortening_.to());
   else
@@ -385,14 +454,14 @@ void Search::Run::next_margins() {
   if (++attempt_ == attempts.size())
     return end(fmt::format("no path was found within {} checks", settings_.checks_max));
   set_margins();
-  from_start_.add(problem_.start, -1);
+  add_chain(head_, from_start_);
   follows_known_ = false;
   tried_ = 0;
   phase_ = Phase::straight;
 }
 
-void Search::Run::finish() {
-  path_.points = shortening_.points();
+void Search::Run::finish(const MatrixXd& points) {
+  path_.points = points;
   path_.length = path_length(path_.points);
   path_.margin_m = margins_->full_m();
   path_.states += from_start_.size() + from_goal_.size();
@@ -403,6 +472,9 @@ void Search::Run::end(std::string cause) {
   path_.cause = std::move(cause);
   path_.checks = used();
   path_.roots = static_cast<int>(roots_.size());
+  path_.goals = finder_.figures();
+  for (const Root& root : roots_)
+    if (path_.points.cols() > 0 && root.q == path_.points.rightCols<1>()) path_.goal = root.goal;
   phase_ = Phase::ended;
 }
 

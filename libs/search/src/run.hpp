@@ -1,5 +1,6 @@
 #pragma once
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "hamelin/search/search.hpp"
@@ -7,6 +8,7 @@
 #include "roots.hpp"
 #include "shortening.hpp"
 #include "tree.hpp"
+#include "way_follower.hpp"
 
 namespace hamelin::search {
 
@@ -26,6 +28,7 @@ class Search::Run {
 
  private:
   enum class Phase {
+    follow_way,
     first_root,
     more_roots,
     straight,
@@ -46,7 +49,15 @@ class Search::Run {
   void next_margins();
   /// Why there is no root.
   [[nodiscard]] std::string no_root() const;
-  void add_root(const Root& root);
+  /// The way of a goal that has one, at once.
+  void follow_way();
+  /// Begins with the stretch that leads away from the start. @return whether it is clear
+  [[nodiscard]] bool retreat();
+  /// @return whether its approach is clear
+  [[nodiscard]] bool add_root(Root root);
+  [[nodiscard]] bool approach(Root& root);
+  /// @return the node of its last point
+  static int add_chain(const Eigen::MatrixXd& points, Tree& tree);
   void set_margins();
   void take_straight(bool clear);
   void begin_growing();
@@ -63,14 +74,19 @@ class Search::Run {
   void join(int in_start, int in_goal);
   void found_first(const Eigen::MatrixXd& points);
   void improve();
-  void finish();
+  void finish(const Eigen::MatrixXd& points);
   void end(std::string cause);
-  [[nodiscard]] long used() const { return query_->checks() - before_ + finder_.checks(); }
+  [[nodiscard]] long used() const {
+    return query_->checks() - before_ + finder_.checks() + followed_ + follower_.checks();
+  }
 
   const Settings& settings_;
+  const model::Model& model_;
+  dynamics::Workspace ws_;
   Eigen::VectorXd weights_;
   dynamics::JointBox box_, bounds_;
   Roots finder_;
+  WayFollower follower_;
   Shortening shortening_;
   Tree from_start_, from_goal_;
   Problem problem_;
@@ -80,8 +96,11 @@ class Search::Run {
   Phase phase_ = Phase::ended;
   bool asked_ = false;  ///< a motion is being proved
   long before_ = 0;     ///< checks of the query
+  long followed_ = 0;   ///< minus those of the follower before the search
   double start_clearance_ = 0.0, self_most_ = 0.0;
   std::size_t attempt_ = 0;  ///< of the margins
+  Eigen::MatrixXd head_;     ///< from the start to where the search begins
+  std::string blocked_;      ///< why the last approach was
   std::vector<Root> roots_;
   std::size_t tried_ = 0;  ///< roots to which the straight line was tried
   bool tries_known_ = false, follows_known_ = false;  ///< as the first root; its lines

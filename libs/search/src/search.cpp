@@ -7,13 +7,12 @@
 
 #include "hamelin/core/error.hpp"
 #include "run.hpp"
+#include "search_input.hpp"
 
 namespace hamelin::search {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-
-namespace {
 
 void check(const model::Model& model, const Settings& settings) {
   for (const VectorXd* limits : {&settings.q_lower, &settings.q_upper})
@@ -26,13 +25,20 @@ void check(const model::Model& model, const Settings& settings) {
                 "search: margins and checks_max: expected margins of at least 0 and 1 check");
 }
 
+namespace {
+
 void check(const scene::Goal& goal) {
   if (goal.type == scene::GoalType::follow)
     throw Error(ErrorCode::invalid,
                 "search: goal: follows a target, expected a goal that stays where it is");
+  if (goal.type == scene::GoalType::any_of)
+    throw Error(ErrorCode::invalid,
+                "search: goal: is any of several, expected these as goals of their own");
   if (!goal.pose.p().allFinite() || !goal.pose.R().allFinite())
     throw Error(ErrorCode::invalid, "search: goal: is not finite, expected finite numbers");
 }
+
+}  // namespace
 
 void check(const model::Model& model, const Problem& problem) {
   const auto fits = [&](const VectorXd& q, const char* name) {
@@ -50,13 +56,14 @@ void check(const model::Model& model, const Problem& problem) {
     throw Error(ErrorCode::invalid,
                 fmt::format("search: known path: {} rows given, expected {} of finite numbers",
                             problem.known.rows(), model.dof()));
+  if (problem.way && (problem.goals.size() != 1 || !problem.goals.front().way))
+    throw Error(ErrorCode::invalid,
+                "search: way: is given without a goal that has one, expected one such goal");
   for (const scene::Goal& goal : problem.goals) {
     check(goal);
     if (goal.type == scene::GoalType::joint) fits(goal.q, "goal");
   }
 }
-
-}  // namespace
 
 double path_length(const Eigen::MatrixXd& points) {
   double length = 0.0;

@@ -3,98 +3,54 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "hamelin/core/numbers.hpp"
+#include "tip_rule.hpp"
 
 namespace hamelin::search {
 
 using Eigen::Index;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
 
-// What plans leave of a tolerance, at most as shares of it, for an arm that strays from its path.
-constexpr double reserve_rad = 0.02, reserve_m = 0.003, reserve_share = 0.3,
-                 reserve_box_share = 0.15;
-// Shares of what plans may use to which configurations are brought, so that lines between them have
-// room to bend; of a box without an end, so far from its other side [m].
-constexpr double inner_share = 0.6, inner_m = 0.01;
-// What a start may add to what it uses, as a share of the tolerance.
-constexpr double start_share = 0.1;
 constexpr double rounding = 1e-12;
 constexpr int iterations_max = 30;
-constexpr double rotation_length = 0.25;  // makes a rotation comparable with a displacement [m]
-constexpr double damping = 1e-5;          // added to J Jᵀ [m²]
-constexpr double largest_step = 0.3;      // of any joint [rad or m]
-
-Matrix3d frame_along(const Vector3d& direction) {
-  return Eigen::Quaterniond::FromTwoVectors(direction, Vector3d::UnitZ()).toRotationMatrix();
-}
-
-double angle_of(const Vector3d& value) {
-  return std::atan2(value.head<2>().norm(), value.z());
-}
-
-// Of all unit vectors that are no farther than `bend` from the segment between two.
-double largest_angle(const Vector3d& a, const Vector3d& b, double bend) {
-  const double most = std::max(angle_of(a), angle_of(b));
-  if (!(a.z() > 0.0 && b.z() > 0.0) || bend == 0.0) return most + bend;
-  const double across = std::max(a.head<2>().norm(), b.head<2>().norm());
-  return std::max(most, std::asin(std::min(1.0, across + bend)));
-}
-
-// The part of [low, high] in which configurations are left where they are.
-std::pair<double, double> inner(double low, double high) {
-  const bool has_low = std::isfinite(low), has_high = std::isfinite(high);
-  const double rim = has_low && has_high ? 0.5 * (1.0 - inner_share) * (high - low) : inner_m;
-  return {has_low ? low + rim : low, has_high ? high - rim : high};
-}
-
-// About which a vector turns towards z, by its components.
-Vector3d turn_axis(const Vector3d& value) {
-  const double across = value.head<2>().norm();
-  return across > 1e-9 ? Vector3d(value.y() / across, -value.x() / across, 0.0) : Vector3d::UnitX();
-}
+constexpr double damping = 1e-5;      // added to J Jᵀ [m²]
+constexpr double largest_step = 0.3;  // of any joint [rad or m]
+constexpr Index rows_per_rule = 6;
 
 }  // namespace
 
 TipConstraints::TipConstraints(const model::Model& model,
                                const std::vector<scene::TipConstraint>& constraints)
     : model_(model), levers_(model, nullptr), ws_(model), J_(6, model.dof()) {
-  for (const scene::TipConstraint& constraint : constraints) {
-    scene::check(constraint, fmt::format("constraint {}", kept_.size() + 1));
-    Kept kept{};
-    if (const auto* axis = std::get_if<scene::AxisConstraint>(&constraint)) {
-      kept.is_axis = true;
-      kept.axis = axis->axis.normalized();
-      kept.from_world = frame_along(axis->direction.normalized());
-      kept.angle = axis->angle_rad;
-      kept.reserve = std::min(reserve_rad, reserve_share * kept.angle);
-      kept.plan_angle = kept.angle - kept.reserve;
-    } else {
-      const auto& box = std::get<scene::BoxConstraint>(constraint);
-      kept.from_world = box.pose.R().transpose();
-      kept.origin = box.pose.p();
-      kept.low = box.low_m;
-      kept.high = box.high_m;
-      const Vector3d reserve = (reserve_box_share * (kept.high - kept.low)).cwiseMin(reserve_m);
-      kept.reserve = reserve.minCoeff();
-      kept.plan_low = kept.low + reserve;
-      kept.plan_high = kept.high - reserve;
-    }
-    kept_.push_back(kept);
+  for (auto* x : {&start_, &dq_, &q_, &curvature_, &step_}) x->setZero(model.dof());
+  for (std::size_t i = 0; i < constraints.size(); ++i) {
+    scene::check(constraints[i], fmt::format("constraint {}", i + 1));
+    if (const auto* axis = std::get_if<scene::AxisConstraint>(&constraints[i]))
+      add(axis_rule(*axis), i + 1);
+    if (const auto* box = std::get_if<scene::BoxConstraint>(&constraints[i]))
+      add(box_rule(*box), i + 1);
   }
-  from_.resize(kept_.size());
+}
+
+TipConstraints::~TipConstraints() = default;
+
+void TipConstraints::add(const TipCurve& curve, const scene::WayTolerance& tolerance,
+                         const std::optional<Ball>& within) {
+  add(curve_rule(curve, tolerance, within), rules_.size() + 1);
+}
+
+void TipConstraints::add(std::unique_ptr<TipRule> rule, std::size_t number) {
+  rules_.push_back(std::move(rule));
+  numbers_.push_back(number);
+  from_.resize(rules_.size());
   to_ = from_;
   middle_.fill(from_);
-  for (auto* x : {&start_, &dq_, &q_, &curvature_, &step_}) x->setZero(model.dof());
-  rows_.setZero(3 * static_cast<Index>(kept_.size()), model.dof());
+  rows_.setZero(rows_per_rule * static_cast<Index>(rules_.size()), model_.dof());
   error_.setZero(rows_.rows());
 }
 
@@ -102,17 +58,7 @@ void TipConstraints::place(const VectorXd& q, Values& out) {
   dynamics::forward_kinematics(model_, ws_, q);
   tip_ = dynamics::tip_pose(model_, ws_);
   ++checks_;
-  for (std::size_t k = 0; k < kept_.size(); ++k) out[k] = value_of(kept_[k], tip_);
-}
-
-Vector3d TipConstraints::value_of(const Kept& kept, const geometry::SE3& tip) {
-  return kept.from_world *
-         (kept.is_axis ? Vector3d(tip.R() * kept.axis) : Vector3d(tip.p() - kept.origin));
-}
-
-double TipConstraints::excess_of(const Kept& kept, const Vector3d& value) {
-  return kept.is_axis ? angle_of(value) - kept.angle
-                      : (value - kept.high).cwiseMax(kept.low - value).maxCoeff();
+  for (std::size_t k = 0; k < rules_.size(); ++k) out[k] = rules_[k]->value(tip_);
 }
 
 // docs/theory.md (21.1)
@@ -120,63 +66,45 @@ void TipConstraints::measure(const VectorXd& a, const VectorXd& b, std::vector<d
   set_motion(a, b, VectorXd::Zero(a.size()));
   place(a, from_);
   place(b, to_);
-  for (std::size_t k = 0; k < kept_.size(); ++k)
-    by[k] = kept_[k].is_axis
-                ? largest_angle(from_[k], to_[k], bend_rad_) - kept_[k].angle
-                : std::max(excess_of(kept_[k], from_[k]), excess_of(kept_[k], to_[k])) + bend_m_;
+  for (std::size_t k = 0; k < rules_.size(); ++k)
+    by[k] = rules_[k]->excess(from_[k], to_[k], {bend_rad_, bend_m_});
+}
+
+double TipConstraints::largest_way(const VectorXd& a, const VectorXd& b) {
+  set_motion(a, b, VectorXd::Zero(a.size()));
+  place(a, from_);
+  const Eigen::Vector3d p = tip_.p();
+  place(b, from_);
+  return (tip_.p() - p).norm() + 4.0 * bend_m_;  // the mean, and half of what it changes by
 }
 
 TipConstraints::Excess TipConstraints::excess(const VectorXd& q) {
   place(q, from_);
   Excess worst{0, -infinity};
-  for (std::size_t k = 0; k < kept_.size(); ++k)
-    if (const double by = excess_of(kept_[k], from_[k]); by > worst.by) worst = {k, by};
+  for (std::size_t k = 0; k < rules_.size(); ++k)
+    if (const double by = rules_[k]->excess(from_[k]); by > worst.by) worst = {k, by};
   return worst;
 }
 
 TipConstraints::Excess TipConstraints::excess(const dynamics::TipTarget& target) const {
   Excess worst{0, -infinity};
-  for (std::size_t k = 0; k < kept_.size(); ++k) {
-    if (kept_[k].is_axis && !target.turns) continue;
-    const double by = excess_of(kept_[k], value_of(kept_[k], {target.rotation, target.position}));
+  for (std::size_t k = 0; k < rules_.size(); ++k) {
+    if (rules_[k]->turns() && !target.turns) continue;
+    const double by = rules_[k]->excess(rules_[k]->value({target.rotation, target.position}));
     if (by > worst.by) worst = {k, by};
   }
   return worst;
 }
 
 std::string TipConstraints::describe(const Excess& excess) const {
-  const bool is_axis = kept_[excess.constraint].is_axis;
-  return fmt::format("constraint {} ({}) is exceeded by {:.3g} {}", excess.constraint + 1,
-                     is_axis ? "axis" : "box", excess.by, is_axis ? "rad" : "m");
+  const TipRule& rule = *rules_[excess.constraint];
+  return fmt::format("constraint {} ({}) is exceeded by {:.3g} {}", numbers_[excess.constraint],
+                     rule.name(), excess.by, rule.unit());
 }
 
 void TipConstraints::admit(const VectorXd& q) {
   place(q, from_);
-  for (std::size_t k = 0; k < kept_.size(); ++k) {
-    Kept& kept = kept_[k];
-    if (kept.is_axis) {
-      kept.plan_angle = std::max(
-          kept.plan_angle, std::min(kept.angle, angle_of(from_[k]) + start_share * kept.angle));
-      continue;
-    }
-    const Vector3d more = (start_share * (kept.high - kept.low)).cwiseMin(reserve_m);
-    kept.plan_low = kept.plan_low.cwiseMin((from_[k] - more).cwiseMax(kept.low));
-    kept.plan_high = kept.plan_high.cwiseMax((from_[k] + more).cwiseMin(kept.high));
-  }
-}
-
-// docs/theory.md (21.1), (21.2): values stray from the segment between those of the ends.
-bool TipConstraints::within_plan(std::size_t k, const Vector3d& a, const Vector3d& b,
-                                 double width) const {
-  const Kept& kept = kept_[k];
-  if (kept.is_axis) {
-    const double stray = stray_rad_ + width * width * bend_rad_ + rounding;
-    return a.z() > 0.0 && b.z() > 0.0 &&
-           std::max(a.head<2>().norm(), b.head<2>().norm()) + stray <= std::sin(kept.plan_angle);
-  }
-  const double stray = stray_m_ + width * width * bend_m_ + rounding;
-  return (a.cwiseMin(b).array() - stray >= kept.plan_low.array()).all() &&
-         (a.cwiseMax(b).array() + stray <= kept.plan_high.array()).all();
+  for (std::size_t k = 0; k < rules_.size(); ++k) rules_[k]->admit(from_[k]);
 }
 
 double TipConstraints::turn_of(const VectorXd& deviation) const {
@@ -187,26 +115,22 @@ double TipConstraints::turn_of(const VectorXd& deviation) const {
 }
 
 double TipConstraints::reserve_used(const VectorXd& deviation) const {
+  const TipStray used{turn_of(deviation), levers_.tip().dot(deviation)};
   double most = 0.0;
-  for (const Kept& kept : kept_)
-    most = std::max(
-        most, (kept.is_axis ? turn_of(deviation) : levers_.tip().dot(deviation)) / kept.reserve);
+  for (const auto& rule : rules_) most = std::max(most, rule->reserve_used(used));
   return most;
 }
 
 bool TipConstraints::keeps(const VectorXd& q) {
   stray_rad_ = stray_m_ = 0.0;
   place(q, from_);
-  for (std::size_t k = 0; k < kept_.size(); ++k)
-    if (!within_plan(k, from_[k], from_[k], 0.0)) return false;
-  return true;
+  return plans_keep(from_, from_, 0.0);
 }
 
 bool TipConstraints::motion_keeps(const VectorXd& a, const VectorXd& b, const VectorXd& stray) {
   set_motion(a, b, stray);
   place(b, to_);
-  for (std::size_t k = 0; k < kept_.size(); ++k)
-    if (!within_plan(k, to_[k], to_[k], 0.0)) return false;
+  if (!plans_keep(to_, to_, 0.0)) return false;
   place(a, from_);
   return piece_keeps(0.0, 1.0, from_, to_, 0);
 }
@@ -224,39 +148,26 @@ void TipConstraints::set_motion(const VectorXd& a, const VectorXd& b, const Vect
   stray_m_ = levers_.tip().dot(stray);
 }
 
+// docs/theory.md (21.1): values stray from the segment between those of the ends.
+bool TipConstraints::plans_keep(const Values& a, const Values& b, double width) const {
+  const double share = width * width;
+  const TipStray stray{stray_rad_ + share * bend_rad_ + rounding,
+                       stray_m_ + share * bend_m_ + rounding};
+  for (std::size_t k = 0; k < rules_.size(); ++k)
+    if (!rules_[k]->plan_keeps(a[k], b[k], stray)) return false;
+  return true;
+}
+
 bool TipConstraints::piece_keeps(double from, double to, const Values& a, const Values& b,
                                  int depth) {
-  bool proved = true;
-  for (std::size_t k = 0; k < kept_.size() && proved; ++k)
-    proved = within_plan(k, a[k], b[k], to - from);
-  if (proved) return true;
+  if (plans_keep(a, b, to - from)) return true;
   if (depth == depth_max) return false;
   Values& middle = middle_[static_cast<std::size_t>(depth)];
   const double half = 0.5 * (from + to);
   q_ = start_ + half * dq_;
   place(q_, middle);
-  for (std::size_t k = 0; k < kept_.size(); ++k)
-    if (!within_plan(k, middle[k], middle[k], 0.0)) return false;
-  return piece_keeps(from, half, a, middle, depth + 1) &&
+  return plans_keep(middle, middle, 0.0) && piece_keeps(from, half, a, middle, depth + 1) &&
          piece_keeps(half, to, middle, b, depth + 1);
-}
-
-void TipConstraints::add_rows(const Kept& kept, const Vector3d& value) {
-  if (kept.is_axis) {
-    const double by = angle_of(value) - inner_share * kept.plan_angle;
-    if (by <= 0.0) return;
-    const Vector3d about = kept.from_world.transpose() * turn_axis(value);
-    rows_.row(row_count_).noalias() = rotation_length * (about.transpose() * J_.topRows<3>());
-    error_[row_count_++] = rotation_length * by;
-    return;
-  }
-  for (Index i = 0; i < 3; ++i) {
-    const auto [low, high] = inner(kept.plan_low[i], kept.plan_high[i]);
-    const double by = value[i] < low ? low - value[i] : std::min(0.0, high - value[i]);
-    if (by == 0.0) continue;
-    rows_.row(row_count_).noalias() = kept.from_world.row(i) * J_.bottomRows<3>();
-    error_[row_count_++] = by;
-  }
 }
 
 // docs/theory.md (21.3)
@@ -265,13 +176,13 @@ bool TipConstraints::project(VectorXd& q, const dynamics::JointBox& box) {
   for (int k = 0; k < iterations_max; ++k) {
     place(q, from_);
     dynamics::frame_jacobian(model_, ws_, model_.robot().tip.link, tip_.p(), J_);
-    row_count_ = 0;
-    for (std::size_t i = 0; i < kept_.size(); ++i) add_rows(kept_[i], from_[i]);
-    if (row_count_ == 0) break;
-    const auto rows = rows_.topRows(row_count_);
+    Index count = 0;
+    for (const auto& rule : rules_) rule->add_rows(tip_, J_, rows_, error_, count);
+    if (count == 0) break;
+    const auto rows = rows_.topRows(count);
     Eigen::MatrixXd G = rows * rows.transpose();
     G.diagonal().array() += damping;
-    step_.noalias() = rows.transpose() * G.llt().solve(error_.head(row_count_)).eval();
+    step_.noalias() = rows.transpose() * G.llt().solve(error_.head(count)).eval();
     const double largest = step_.lpNorm<Eigen::Infinity>();
     if (largest > largest_step) step_ *= largest_step / largest;
     q = (q + step_).cwiseMax(box.lower).cwiseMin(box.upper);
@@ -281,34 +192,15 @@ bool TipConstraints::project(VectorXd& q, const dynamics::JointBox& box) {
 }
 
 void TipConstraints::restrict(dynamics::TipTarget& target, const VectorXd& seed) {
-  for (const Kept& kept : kept_) {
-    if (kept.is_axis) {
-      if (!target.turns) {
-        place(seed, from_);
-        target.rotation = tip_.R();
-        target.turns = true;
-        target.tolerance_rad = infinity;
-      }
-      const Vector3d value = kept.from_world * target.rotation * kept.axis;
-      const double by = angle_of(value) - inner_share * kept.plan_angle;
-      if (by > 0.0) {
-        const Vector3d about = kept.from_world.transpose() * turn_axis(value);
-        target.rotation = Eigen::AngleAxisd(by, about).toRotationMatrix() * target.rotation;
-      }
-      target.tolerance_rad = std::min(target.tolerance_rad, (1.0 - inner_share) * kept.plan_angle);
-      continue;
-    }
-    Vector3d value = kept.from_world * (target.position - kept.origin);
-    for (Index i = 0; i < 3; ++i) {
-      const auto [low, high] = inner(kept.plan_low[i], kept.plan_high[i]);
-      value[i] = std::clamp(value[i], low, std::max(low, high));
-      if (std::isfinite(low))
-        target.tolerance_m = std::min(target.tolerance_m, low - kept.plan_low[i]);
-      if (std::isfinite(high))
-        target.tolerance_m = std::min(target.tolerance_m, kept.plan_high[i] - high);
-    }
-    target.position = kept.origin + kept.from_world.transpose() * value;
+  const bool turns =
+      std::any_of(rules_.begin(), rules_.end(), [](const auto& rule) { return rule->turns(); });
+  if (turns && !target.turns) {
+    place(seed, from_);
+    target.rotation = tip_.R();
+    target.turns = true;
+    target.tolerance_rad = infinity;
   }
+  for (const auto& rule : rules_) rule->restrict(target);
 }
 
 }  // namespace hamelin::search

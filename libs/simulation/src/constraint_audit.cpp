@@ -6,10 +6,21 @@
 
 namespace hamelin::simulation {
 
+namespace {
+
+void raise(log::Result::Constraint& figure, double excess, double time_s) {
+  if (!(excess > figure.excess)) return;
+  figure.excess = excess;
+  figure.time_s = time_s;
+}
+
+}  // namespace
+
 ConstraintAudit::ConstraintAudit(const scene::Scene& scene, const model::Model& model) {
   for (const scene::Goal& goal : scene.goals) {
     Goal& out = goals_.emplace_back();
     if (goal.constraints.empty()) continue;
+    out.speed_max_m_s = scene::speed_max_m_s(goal.constraints);
     out.kept = std::make_unique<search::TipConstraints>(model, goal.constraints);
     for (const scene::TipConstraint& constraint : goal.constraints)
       out.figures.push_back({goals_.size(), out.figures.size() + 1,
@@ -21,16 +32,19 @@ ConstraintAudit::ConstraintAudit(const scene::Scene& scene, const model::Model& 
 void ConstraintAudit::observe(const Eigen::VectorXd& q, double time_s) {
   if (goal_ < goals_.size() && goals_[goal_].kept) {
     Goal& goal = goals_[goal_];
-    by_.resize(goal.figures.size());
-    goal.kept->measure(goal.seen ? last_ : q, q, by_);
+    const bool moved = goal.seen && time_s > last_s_;
+    by_.resize(goal.kept->size());
+    goal.kept->measure(moved ? last_ : q, q, by_);
     goal.seen = true;
     for (std::size_t k = 0; k < by_.size(); ++k)
-      if (by_[k] > goal.figures[k].excess) {
-        goal.figures[k].excess = by_[k];
-        goal.figures[k].time_s = time_s;
-      }
+      raise(goal.figures[goal.kept->number(k) - 1], by_[k], time_s);
+    for (log::Result::Constraint& figure : goal.figures)
+      if (figure.type == "speed" && moved)
+        raise(figure, goal.kept->largest_way(last_, q) / (time_s - last_s_) - goal.speed_max_m_s,
+              time_s);
   }
   last_ = q;
+  last_s_ = time_s;
 }
 
 std::vector<log::Result::Constraint> ConstraintAudit::figures() const {
@@ -46,7 +60,7 @@ std::vector<std::string> ConstraintAudit::violations() const {
     if (each.excess > 0.0)
       out.push_back(fmt::format("goal {}: constraint {} ({}) was exceeded by {:.3g} {} at {:.6g} s",
                                 each.goal, each.constraint, each.type, each.excess,
-                                each.type == "axis" ? "rad" : "m", each.time_s));
+                                scene::unit_of(each.type), each.time_s));
   return out;
 }
 

@@ -27,12 +27,14 @@ class ConstraintAudit {
  private:
   struct Goal {
     std::unique_ptr<search::TipConstraints> kept;  ///< null: none
+    double speed_max_m_s = 0.0;
     std::vector<log::Result::Constraint> figures;
     bool seen = false;
   };
   std::vector<Goal> goals_;
   std::size_t goal_ = 0;
   Eigen::VectorXd last_;  ///< of size zero before the first node
+  double last_s_ = 0.0;
   std::vector<double> by_;
 };
 

@@ -195,6 +195,7 @@ std::vector<std::string> Judge::describe_goals_in_contact() {
   for (std::size_t i = 0; i < scene_.goals.size(); ++i) {
     const auto& goal = scene_.goals[i];
     if (goal.type == scene::GoalType::follow) break;  // it moves
+    if (goal.type == scene::GoalType::any_of || scene::is_region(goal)) continue;
     const bool of_joints = goal.type == scene::GoalType::joint;
     if (own_) own_->allow(goal.may_touch);
     const scene::Shapes placed =

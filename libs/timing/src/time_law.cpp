@@ -62,6 +62,7 @@ TimeLaw::TimeLaw(const model::Model& model, Limits limits, Grid grid)
       limits_(std::move(limits)),
       grid_(grid),
       ws_(model),
+      one_(model),
       squared_most_(squared_speed_max) {
   check(limits_.velocity, "velocity", model.dof(), true);
   check(limits_.acceleration, "acceleration", model.dof(), false);
@@ -125,6 +126,7 @@ void TimeLaw::evaluate(const Curve& curve, const VectorXd& places, bool torques,
     out.tangent.col(i) = dq;
     out.curvature.col(i) = ddq;
   }
+  evaluate_tip(out);
   if (!torques) return;
   evaluated_ += n;
   for (auto* x : {&out.inertia, &out.bias, &out.gravity}) x->resize(dof, n);
@@ -134,6 +136,19 @@ void TimeLaw::evaluate(const Curve& curve, const VectorXd& places, bool torques,
   dynamics::inverse_dynamics(model_, ws_, q_, out.tangent, out.curvature, out.bias);
   out.inertia -= out.gravity;
   out.bias -= out.gravity;
+}
+
+void TimeLaw::evaluate_tip(Rows& out) {
+  out.tip.resize(std::isfinite(limits_.tip_speed) ? q_.cols() : 0);
+  VectorXd q(model_.dof()), dq(model_.dof());
+  for (Index i = 0; i < out.tip.size(); ++i) {
+    q = q_.col(i);
+    dq = out.tangent.col(i);
+    dynamics::forward_kinematics(model_, one_, q);
+    out.tip[i] = dynamics::point_velocity(model_, one_, model_.robot().tip.link,
+                                          dynamics::tip_pose(model_, one_).p(), dq)
+                     .norm();
+  }
 }
 
 // docs/theory.md (19.6): rows at a node, where x is that of the interval's beginning + lead · u.
@@ -222,6 +237,9 @@ bool TimeLaw::backward() {
       if (const double slope = rows_.tangent(j, i); slope != 0.0)
         squared_max_[i] =
             std::min(squared_max_[i], std::pow(share * limits_.velocity[j] / slope, 2));
+    if (rows_.tip.size() > 0 && rows_.tip[i] > 0.0)
+      squared_max_[i] =
+          std::min(squared_max_[i], std::pow(share * limits_.tip_speed / rows_.tip[i], 2));
   }
   controllable_.resize(n);
   controllable_[n - 1] = squared_at_end_;
@@ -425,6 +443,9 @@ TimeLaw::Used TimeLaw::used(const TimedPath& motion, Index i, const Rows& nodes)
     raise(out.ramp, std::abs(r * between_.tangent(j, i)), limits_.jerk, j);
     raise(out.ramp, std::abs(r * between_.inertia(j, i)), limits_.torque_rate, j);
   }
+  if (between_.tip.size() > 0)
+    out.values = std::max({out.values, between_.tip[i] * std::sqrt(x1) / limits_.tip_speed,
+                           nodes.tip[i] * motion.speed[i] / limits_.tip_speed});
   return out;
 }
 

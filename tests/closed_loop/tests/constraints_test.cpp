@@ -28,6 +28,7 @@ Json upright_shelf(const Json& constraints) {
   for (const std::size_t i : {0U, 2U, 4U, 0U}) {
     Json goal = goals[i];
     goal["tolerance_rad"] = 0.04;
+    goal["speed_max"] = 0.02;
     if (i != 0 || !document["goals"].empty()) goal["constraints"] = constraints;
     document["goals"].push_back(goal);
   }
@@ -92,4 +93,27 @@ TEST_CASE("planners that follow no paths are refused for goals with constraints"
   document = upright_shelf({{{"type", "box"}, {"low_m", {0, 0, 1}}, {"high_m", {1, 1, 1}}}});
   CHECK_THAT(test::error_of([&] { run_shelf(document); }),
              Contains("/goals/1/constraints/0: low_m is not below high_m on each axis"));
+}
+
+TEST_CASE("a tip is no faster on its way than its goals allow", "[simulation][constraints]") {
+  constexpr double slow = 0.25;
+  Json document = upright_shelf({{{"type", "speed"}, {"speed_m_s", slow}}});
+  const log::Result result = run_shelf(document);
+  CHECK(result.outcome == log::Outcome::reached);
+  REQUIRE(result.constraints.size() == 3);
+  for (const auto& kept : result.constraints) {
+    CHECK(kept.type == "speed");
+    CHECK(kept.excess <= 0.0);
+    CHECK(kept.excess > -0.15 * slow);  // it is used
+  }
+  document = upright_shelf({{{"type", "speed"}, {"speed_m_s", 100.0}}});
+  const log::Result fast = run_shelf(document);
+  CHECK(fast.time_s < 0.7 * result.time_s);
+  CHECK(fast.constraints[0].excess + 100.0 > 3.0 * slow);
+  document = upright_shelf({{{"type", "speed"}, {"speed_m_s", 0.1}, {"axis", {0, 0, 1}}}});
+  CHECK_THAT(test::error_of([&] { run_shelf(document); }),
+             Contains("/constraints/0/axis: is not allowed for a constraint of type speed"));
+  document = upright_shelf({{{"type", "speed"}}});
+  CHECK_THAT(test::error_of([&] { run_shelf(document); }),
+             Contains("/constraints/0/speed_m_s: is missing"));
 }

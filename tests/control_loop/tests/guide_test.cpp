@@ -180,13 +180,13 @@ TEST_CASE("planners that follow no paths are shown their way-points", "[control]
           control::guide_settings(scene, loop.arm, loop.controller.view(), {}, Json::object()),
           nullptr, 0),
       64, false);
+  const auto goals = std::make_shared<const std::vector<scene::Goal>>(scene.goals);
   for (const bool follows : {true, false}) {
     control::Guidance guidance(spec, loop.arm.dof(), 64, follows, false);
     VectorXd q = scene.start_q;
     const auto update = [&](double time_s) {
       const auto news = guidance.update(
-          {time_s, 0.001, q, scene.goals.front(), follows ? 1U : 2U, 0, 0, nullptr, nullptr},
-          search);
+          {time_s, 0.001, q, goals, 0, follows ? 1U : 2U, 0, 0, nullptr, nullptr}, search);
       search.run();
       return news;
     };

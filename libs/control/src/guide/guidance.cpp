@@ -29,7 +29,8 @@ Guidance::Guidance(const scene::GuideSpec& spec, Index dof, Index points_max, bo
     : spec_(spec),
       follows_paths_(follows_paths),
       check_time_s_(charges ? spec.check_time_s : 0.0),
-      path_(MatrixXd::Zero(dof, points_max)) {
+      path_(MatrixXd::Zero(dof, points_max)),
+      goal_start_(VectorXd::Zero(dof)) {
   cause_.reserve(cause_max);
 }
 
@@ -49,11 +50,12 @@ Guidance::News Guidance::update(const Now& now, GuideSearch& search) {
 // them are searched where the planner asks.
 void Guidance::begin(const Now& now) {
   goal_number_ = now.goal_number;
-  follows_ = now.goal.type == scene::GoalType::follow;
-  constrained_ = !now.goal.constraints.empty();
-  const bool guided = constrained_ || (spec_.type != scene::GuideType::on_request && !follows() &&
-                                       now.goal.path.cols() == 0);
+  follows_ = now.goal().type == scene::GoalType::follow;
+  needs_path_ = scene::needs_path(now.goal());
+  const bool guided = needs_path_ || (spec_.type != scene::GuideType::on_request && !follows() &&
+                                      now.goal().path.cols() == 0);
   mode_ = guided ? Mode::waiting : Mode::off;
+  goal_start_ = now.q;
   awaits_ = false;
   wants_ = guided;
   searches_ = guided ? 1 : 0;
@@ -72,10 +74,10 @@ bool Guidance::request() {
   return true;
 }
 
-// Without a path nothing would keep constraints: then the arm goes on waiting for one.
+// An arm whose goal needs a path goes on waiting for one.
 void Guidance::give_up_path() noexcept {
-  mode_ = constrained_ ? Mode::waiting : Mode::unguided;
-  wants_ = constrained_;
+  mode_ = needs_path_ ? Mode::waiting : Mode::unguided;
+  wants_ = needs_path_;
   ++number_;
 }
 
@@ -85,16 +87,11 @@ void Guidance::ask(const Now& now, GuideSearch& search) {
   request.time_s = now.time_s;
   request.allowance = now.allowance;
   request.q = now.q;
-  request.goal.type = now.goal.type;
-  if (now.goal.type == scene::GoalType::joint) request.goal.q = now.goal.q;
-  request.goal.pose = now.goal.pose;
-  if (follows() && now.target != nullptr) {
-    request.goal.type = now.goal.position_only ? scene::GoalType::position : scene::GoalType::pose;
-    request.goal.pose = now.target->pose;
-  }
-  request.goal.tolerance_m = now.goal.tolerance_m;
-  request.goal.tolerance_rad = now.goal.tolerance_rad;
-  request.goal.constraints = now.goal.constraints;
+  request.goals = now.goals;
+  request.goal = now.goal_index;
+  request.way_start = goal_start_;
+  request.target.reset();
+  if (follows() && now.target != nullptr) request.target = now.target->pose;
   request.search = asked_;
   request.kept_count = 0;
   if (mode_ == Mode::guided && !follows()) fill_kept(now, request);
@@ -124,6 +121,7 @@ Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
   if (answer.path.found() && answer.path.points.cols() <= path_.cols()) {
     ++figures_.found;
     figures_.length = answer.path.length;
+    figures_.option = answer.path.goal;
     margin_m_ = answer.path.margin_m;
     cause_.assign(answer.motion_cause, 0, cause_max);
     before_.swap(answer.motion);  // the memory of the one before goes back with the answer
@@ -132,7 +130,7 @@ Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
     return News::path;
   }
   cause_.assign(answer.path.cause, 0, cause_max);
-  if (mode_ == Mode::waiting && !constrained_) {
+  if (mode_ == Mode::waiting && !needs_path_) {
     mode_ = Mode::unguided;
     if (!follows()) ++number_;
   }
@@ -189,7 +187,7 @@ void Guidance::show(const Now& now, Index first, Index count) {
   shown_.type = HAMELIN_GOAL_JOINT;
   shown_.quaternion_wxyz[0] = 1.0;
   shown_.tolerance_rad = shown_tolerance;
-  shown_.speed_max = now.goal.speed_max;
+  shown_.speed_max = scene::options_of(now.goal()).front().speed_max;
   shown_.q = path_.col(first + count - 1).data();
   shown_.path_search = mode_ == Mode::waiting ? HAMELIN_PATH_SOUGHT : HAMELIN_PATH_FOUND;
   if (!follows_paths_ || count == 1) return;

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string_view>
 #include <vector>
 
@@ -33,12 +34,14 @@ class Guidance {
   struct Now {
     double time_s, period_s;
     const Eigen::VectorXd& q;
-    const scene::Goal& goal;           ///< the current one
+    const std::shared_ptr<const std::vector<scene::Goal>>& goals;
+    std::size_t goal_index;            ///< of the current one
     std::uint64_t goal_number;         ///< another one whenever the goal or the load is another one
     std::uint64_t world;               ///< number of the snapshot
     std::uint64_t allowance;           ///< what the goal may touch, see World::allow()
     const scene::MotionState* target;  ///< that a follow goal has; else null
     const CertifiedPath* in_force;     ///< along which a stop goes on; else null
+    [[nodiscard]] const scene::Goal& goal() const { return (*goals)[goal_index]; }
   };
   /// To be called once per tick, before the planner. @return what has arrived
   News update(const Now& now, GuideSearch& search);
@@ -87,11 +90,12 @@ class Guidance {
 
   scene::GuideSpec spec_;
   bool follows_paths_;
-  bool follows_ = false;      ///< whether the goal follows a target
-  bool constrained_ = false;  ///< whether the tip keeps something on the way
+  bool follows_ = false;     ///< whether the goal follows a target
+  bool needs_path_ = false;  ///< whether the goal does
   double check_time_s_;
   Mode mode_ = Mode::off;
   Eigen::MatrixXd path_;
+  Eigen::VectorXd goal_start_;  ///< where the arm was when the goal became the current one
   /// Along the path, and along the one before, which may still be in force.
   std::unique_ptr<CertifiedPath> motion_, before_;
   Eigen::Index count_ = 0;  ///< way-points of the path

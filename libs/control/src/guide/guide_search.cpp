@@ -2,6 +2,7 @@
 
 #include <exception>
 #include <memory>
+#include <span>
 #include <utility>
 
 namespace hamelin::control {
@@ -10,10 +11,7 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 GuideRequest::GuideRequest(Index dof, Index points_max)
-    : q(VectorXd::Zero(dof)), kept(Eigen::MatrixXd::Zero(dof, points_max)) {
-  goal.q = q;
-  goal.constraints.reserve(scene::constraints_max);
-}
+    : q(VectorXd::Zero(dof)), way_start(q), kept(Eigen::MatrixXd::Zero(dof, points_max)) {}
 
 GuideSearch::GuideSearch(const model::Model& model, const World& world, const WorldView& view,
                          std::unique_ptr<MotionSearch> search, Index points_max, bool threaded)
@@ -59,10 +57,24 @@ bool GuideSearch::still_clear() {
   return request_.kept_count > 0;
 }
 
+search::Problem GuideSearch::problem() const {
+  search::Problem out;
+  out.start = request_.q;
+  out.number = request_.search;
+  out.known = request_.kept.leftCols(request_.kept_count);
+  const scene::Goal& goal = (*request_.goals)[request_.goal];
+  const std::span<const scene::Goal> options = scene::options_of(goal);
+  out.goals.assign(options.begin(), options.end());
+  if (request_.target) {
+    out.goals.front().type = goal.position_only ? scene::GoalType::position : scene::GoalType::pose;
+    out.goals.front().pose = *request_.target;
+  }
+  return out;
+}
+
 void GuideSearch::find(GuideAnswer& out) {
-  MotionSearch::Found found = search_->find(
-      {request_.q, {request_.goal}, request_.search, request_.kept.leftCols(request_.kept_count)},
-      query_);
+  MotionSearch::Found found =
+      search_->find(problem(), (*request_.goals)[request_.goal], request_.way_start, query_);
   out.checks += found.checks;
   out.path = std::move(found.path);
   out.motion = std::move(found.motion);
@@ -84,6 +96,7 @@ void GuideSearch::answer() {
   } catch (const std::exception& e) {  // on a thread of its own nobody could catch it
     out->path.cause = e.what();
   }
+  request_.goals.reset();
   answers_.publish(std::move(out));
 }
 

@@ -3,8 +3,10 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "guide/guide_query.hpp"
 #include "guide/motion_search.hpp"
@@ -21,7 +23,10 @@ struct GuideRequest {
   double time_s = 0.0;          ///< of the tick
   std::uint64_t allowance = 0;  ///< number of what may be touched, see World::allow()
   Eigen::VectorXd q;            ///< where the search begins
-  scene::Goal goal;
+  Eigen::VectorXd way_start;    ///< where the way of a goal begins that has one
+  std::shared_ptr<const std::vector<scene::Goal>> goals;  ///< with the goal; null in between
+  std::size_t goal = 0;                                   ///< its index
+  std::optional<geometry::SE3> target;                    ///< where what a follow goal follows is
   std::uint64_t search = 0;  ///< number of the search, see search::Problem
   /// A path that is kept if it is still clear: its first kept_count columns; 0: none.
   Eigen::MatrixXd kept;
@@ -69,6 +74,7 @@ class GuideSearch {
   void answer();
   [[nodiscard]] bool still_clear();
   void find(GuideAnswer& out);
+  [[nodiscard]] search::Problem problem() const;
 
   std::unique_ptr<MotionSearch> search_;
   GuideQuery query_;

@@ -1,15 +1,19 @@
 #include "guide/motion_search.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "hamelin/core/error.hpp"
 #include "hamelin/search/constrained_query.hpp"
+#include "hamelin/search/ways.hpp"
 
 namespace hamelin::control {
 
 MotionSearch::MotionSearch(const model::Model& model, search::Settings settings,
                            std::unique_ptr<PathTiming> timing, long other_checks)
     : model_(model),
+      ws_(model),
       search_(model, std::move(settings)),
       timing_(std::move(timing)),
       other_checks_(other_checks) {}
@@ -19,24 +23,70 @@ long MotionSearch::other_checks(const scene::GuideSpec& spec) {
   return std::lround(spec.check_time_s * most > most_s ? most_s / spec.check_time_s : most);
 }
 
-MotionSearch::Found MotionSearch::find(const search::Problem& problem, GuideQuery& query) {
-  const auto& kept = problem.goals.front().constraints;
-  if (kept.empty()) return find(problem, query, query);
-  search::TipConstraints constraints(model_, kept);
-  search::ConstrainedQuery constrained(query, constraints);
-  return find(problem, query, constrained);
+geometry::SE3 MotionSearch::tip_at(const Eigen::VectorXd& q) {
+  dynamics::forward_kinematics(model_, ws_, q);
+  return dynamics::tip_pose(model_, ws_);
 }
 
-MotionSearch::Found MotionSearch::find(const search::Problem& problem, const GuideQuery& world,
-                                       search::Query& query) {
+MotionSearch::Found MotionSearch::find(search::Problem problem, const scene::Goal& goal,
+                                       const Eigen::VectorXd& way_start, GuideQuery& query) {
+  search::TipConstraints kept(model_, goal.constraints);
+  tip_speed_m_s_ = scene::speed_max_m_s(goal.constraints);
+  if (goal.way) {
+    try {
+      problem.way = search::way_curve(goal, tip_at(way_start));
+    } catch (const Error& e) {
+      Found none;
+      none.path.cause = e.what();
+      return none;
+    }
+    kept.add(*problem.way, goal.way->tolerance);
+  }
+  if (goal.retreat) {
+    problem.retreat = goal.retreat;
+    const geometry::SE3 tip = tip_at(problem.start);
+    kept.add(search::retreat_curve(*goal.retreat, tip), goal.retreat->tolerance,
+             search::ball_of(*goal.retreat, tip));
+  }
+  const bool approaches = std::any_of(problem.goals.begin(), problem.goals.end(),
+                                      [](const scene::Goal& option) { return option.approach; });
+  problem.shortens = !approaches;
+  Found out = find(problem, kept, query, !approaches);
+  if (out.path.found() && approaches) choose(std::move(problem), kept, query, out);
+  return out;
+}
+
+void MotionSearch::choose(search::Problem problem, search::TipConstraints& kept, GuideQuery& query,
+                          Found& found) {
+  scene::Goal goal = scene::joint_goal(found.path.points.rightCols<1>());
+  goal.approach = problem.goals[found.path.goal].approach;
+  if (goal.approach) {
+    const geometry::SE3 tip = tip_at(goal.q);
+    kept.add(search::approach_curve(*goal.approach, tip), goal.approach->tolerance,
+             search::ball_of(*goal.approach, tip));
+  }
+  problem.goals = {std::move(goal)};
+  problem.known = found.path.points;
+  problem.shortens = true;
+  Found again = find(problem, kept, query, true);
+  again.checks += found.checks;
+  again.path.goal = found.path.goal;
+  again.path.goals = std::move(found.path.goals);
+  found = std::move(again);
+}
+
+MotionSearch::Found MotionSearch::find(const search::Problem& problem, search::TipConstraints& kept,
+                                       GuideQuery& world, bool times) {
+  search::ConstrainedQuery constrained(world, kept);
+  search::Query& query = kept.size() > 0 ? static_cast<search::Query&>(constrained) : world;
   Found out;
   out.path = search_.search(problem, query);
   out.checks = out.path.checks;
-  if (!out.path.found() || !timing_) return out;
+  if (!out.path.found() || !timing_ || !times) return out;
   const long before = query.checks() + timing_->checks();
-  timing_->begin(problem.number);
+  timing_->begin(problem.number, tip_speed_m_s_);
   timing_->consider(out.path.points, search_.margins(), query);
-  consider_others(problem, out.path, query);
+  if (!problem.way) consider_others(problem, out.path, query);
   out.motion = timing_->make(query);
   if (out.motion) {
     out.motion->standing = world.standing();

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "guide/guide_query.hpp"
 #include "guide/path_timing.hpp"
@@ -30,19 +31,28 @@ class MotionSearch {
     std::string cause;           ///< one line: why a path has no motion
     long checks = 0;             ///< of all
   };
-  /// Paths and motions keep the constraints of the first goal.
-  [[nodiscard]] Found find(const search::Problem& problem, GuideQuery& query);
+  /// @param problem with the options of the goal
+  /// @param way_start where the way of a goal begins that has one
+  [[nodiscard]] Found find(search::Problem problem, const scene::Goal& goal,
+                           const Eigen::VectorXd& way_start, GuideQuery& query);
 
  private:
-  /// @param query of the same world, which also asks for constraints
-  [[nodiscard]] Found find(const search::Problem& problem, const GuideQuery& world,
-                           search::Query& query);
+  /// @param kept by the tip @param times whether a motion is made
+  [[nodiscard]] Found find(const search::Problem& problem, search::TipConstraints& kept,
+                           GuideQuery& query, bool times);
+  /// The first search chose one of the goals: another one to its configuration only, on which the
+  /// tip keeps to the approach.
+  void choose(search::Problem problem, search::TipConstraints& kept, GuideQuery& query,
+              Found& found);
+  [[nodiscard]] geometry::SE3 tip_at(const Eigen::VectorXd& q);
   void consider_others(search::Problem problem, const search::Path& first, search::Query& query);
 
   const model::Model& model_;
+  dynamics::Workspace ws_;
   search::Search search_;
   std::unique_ptr<PathTiming> timing_;
   long other_checks_;
+  double tip_speed_m_s_ = 0.0;  ///< at most, on the way to the goal
 };
 
 }  // namespace hamelin::control

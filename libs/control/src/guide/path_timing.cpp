@@ -17,6 +17,8 @@ namespace {
 // may cost; fewer where checks take longer than so [s]: the arm waits for them.
 constexpr double tries_max = 250.0, improve_checks = 1000.0, usual_check_s = 2e-6;
 constexpr long checks_per_try = 8;
+// Of a bound of the tip's speed, what a motion uses. The rest is for what keeps the arm on it.
+constexpr double tip_speed_share = 0.9;
 // Places at which torques are evaluated, that cost as much as a check.
 constexpr long places_per_check = 8;
 
@@ -37,7 +39,9 @@ PathTiming::PathTiming(const scene::Scene& scene, const model::Model& model,
   effort_ = {static_cast<int>(tries_max * share), static_cast<long>(improve_checks * share)};
 }
 
-void PathTiming::begin(std::uint64_t number) {
+void PathTiming::begin(std::uint64_t number, double tip_speed_m_s) {
+  law_.set_tip_speed(tip_speed_share * tip_speed_m_s);
+  way_points_.set_tip_speed(tip_speed_share * tip_speed_m_s);
   rng_ = Rng(seed_ + number);
   best_.reset();
 }

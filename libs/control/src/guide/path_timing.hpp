@@ -24,7 +24,8 @@ class PathTiming {
              const MotionBounds& bounds, const search::Settings& settings);
 
   /// Begins with the paths to a goal. @param number of the search, for random numbers
-  void begin(std::uint64_t number);
+  /// @param tip_speed_m_s at most; infinite: any
+  void begin(std::uint64_t number, double tip_speed_m_s);
   /// Takes a path, if it is the fastest so far.
   /// @param points way-points @param margins that the lines between them are proved to keep
   /// @param query proves the blends; its margins are changed

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <ctime>
+#include <span>
 #include <utility>
 
 #include "guide/guide_query.hpp"
 #include "guide/motion_search.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/search/constrained_query.hpp"
+#include "loop/goal_list.hpp"
 
 namespace hamelin::control {
 
@@ -44,6 +47,10 @@ LimitReserve reserve_of(const scene::Scene& scene) {
   return reserve;
 }
 
+VectorXd start_of(const scene::Scene& scene, const model::Model& arm) {
+  return scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(arm.dof());
+}
+
 Json columns(const Eigen::MatrixXd& points) {
   Json out = Json::array();
   for (Index i = 0; i < points.cols(); ++i)
@@ -62,6 +69,21 @@ Json motion_json(const PlannedMotion& motion) {
           {"q", columns(points.q)},
           {"v", columns(points.v)},
           {"a", columns(points.a)}};
+}
+
+// Which goal of several was taken, and why others were not.
+Json options_json(const search::Path& path) {
+  Json options = Json::array();
+  for (std::size_t i = 0; i < path.goals.size(); ++i) {
+    const search::GoalFigures& figures = path.goals[i];
+    const bool taken = path.found() && i == path.goal;
+    options.push_back({{"tried", figures.tried},
+                       {"reached", figures.reached},
+                       {"clear", figures.clear},
+                       {"cause", taken ? Json(nullptr) : Json(search::why_not(figures))}});
+  }
+  return {{"taken", path.found() ? Json(path.goal) : Json(nullptr)},
+          {"options", std::move(options)}};
 }
 
 Json planned_json(const PlannedGoal& goal) {
@@ -83,6 +105,9 @@ Json planned_json(const PlannedGoal& goal) {
              {"roots", path.roots},
              {"states", path.states}}},
            {"timing", {{"search_s", goal.search_s}}}};
+  if (goal.has_way)
+    out["way"] = {{"share", path.way_share}, {"q", columns(path.found() ? path.points : path.way)}};
+  if (path.goals.size() > 1) out["any_of"] = options_json(path);
   if (path.found())
     out["certificate"] = {
         {"clearance_m", goal.clearance_m},
@@ -90,11 +115,15 @@ Json planned_json(const PlannedGoal& goal) {
   return out;
 }
 
-PlannedGoal planned(MotionSearch& search, GuideQuery& query, const search::Problem& problem) {
+PlannedGoal planned(MotionSearch& search, GuideQuery& query, const scene::Goal& goal,
+                    const VectorXd& start, std::uint64_t number) {
   PlannedGoal out;
-  out.type = scene::type_name(problem.goals.front());
+  out.type = scene::type_name(goal);
+  out.has_way = goal.way.has_value();
+  const std::span<const scene::Goal> options = scene::options_of(goal);
+  const search::Problem problem{start, {options.begin(), options.end()}, number};
   const double since = process_cpu_s();
-  MotionSearch::Found found = search.find(problem, query);
+  MotionSearch::Found found = search.find(problem, goal, start, query);
   out.search_s = process_cpu_s() - since;
   out.path = std::move(found.path);
   if (found.motion) {
@@ -173,16 +202,40 @@ PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& w
   plan.guide = scene::to_string(scene.guide.type);
   plan.seed = scene.seed;
   plan.goal_count = scene.goals.size();
-  VectorXd start = scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(arm.dof());
+  VectorXd start = start_of(scene, arm);
   const std::vector<std::uint64_t> allowances = world.allow(allowances_of(scene.goals));
   for (const scene::Goal& goal : scene.goals) {
     query.refresh(0.0, allowances[plan.goals.size()]);
-    plan.goals.push_back(planned(search, query, {start, {goal}, plan.goals.size() + 1}));
+    plan.goals.push_back(planned(search, query, goal, start, plan.goals.size() + 1));
     const PlannedGoal& found = plan.goals.back();
     if (!found.path.found()) break;
     start = found.path.points.rightCols(1);
   }
   return plan;
+}
+
+search::Postures find_postures(const scene::Scene& scene, std::size_t goal,
+                               const search::PosturesWanted& wanted) {
+  check(scene);
+  if (goal >= scene.goals.size())
+    throw Error(ErrorCode::invalid, fmt::format("{}: /goals/{}: does not exist, expected less than "
+                                                "the number of goals, {}",
+                                                scene.name, goal, scene.goals.size()));
+  const model::Model arm = load_model(scene);
+  World world(scene, arm, {});
+  check_numbers(scene, arm);
+  const WorldView view(scene, arm, world);
+  GuideQuery query(arm, world, view);
+  const scene::Goal& given = scene.goals[goal];
+  query.refresh(0.0, world.allow(allowances_of(scene.goals))[goal]);
+  const std::span<const scene::Goal> options = scene::options_of(given);
+  const search::Problem problem{start_of(scene, arm), {options.begin(), options.end()}, goal + 1};
+  const Json params = scene.planner ? scene.planner->params : Json::object();
+  const search::Settings settings = guide_settings(scene, arm, view, reserve_of(scene), params);
+  search::TipConstraints kept(arm, given.constraints);
+  search::ConstrainedQuery constrained(query, kept);
+  search::Query& asked = kept.size() > 0 ? static_cast<search::Query&>(constrained) : query;
+  return search::find_postures(arm, settings, problem, asked, wanted);
 }
 
 scene::JointTrajectory trajectory_of(const PathPlan& plan, double spacing_s) {

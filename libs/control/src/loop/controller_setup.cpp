@@ -65,7 +65,7 @@ VectorXd positive_per_joint(const scene::Scene& scene, const std::vector<double>
 
 void check_follows(const scene::Scene& scene, const planning::Plugin& plugin) {
   for (std::size_t i = 0; i < scene.goals.size(); ++i) {
-    const std::string defect = constraints_defect(scene.goals[i], scene, plugin);
+    const std::string defect = path_defect(scene.goals[i], scene, plugin);
     if (!defect.empty())
       throw Error(ErrorCode::invalid, fmt::format("{}: /goals/{}: {}", scene.name, i, defect));
     if (scene.goals[i].trajectory && !plugin.follows_trajectories())

@@ -393,8 +393,9 @@ const hamelin_goal* Controller::goal_for_planner() {
 
 void Controller::update_guidance() {
   const Guidance::News news = guidance_->update(
-      {time_s_, period_s_, q(), goals_.goal(), listed_number_ + 1, arm_->view.snapshot(),
-       arm_->view.allowance(), answer_.target, path_in_force()},
+      {time_s_, period_s_, q(), goal_list_->shared, std::min(goals_.index(), goals_.size() - 1),
+       listed_number_ + 1, arm_->view.snapshot(), arm_->view.allowance(), answer_.target,
+       path_in_force()},
       *arm_->guide);
   if (const std::uint64_t number = guidance_->number(); number != guidance_number_) {
     guidance_number_ = number;
@@ -402,10 +403,13 @@ void Controller::update_guidance() {
   }
   if (news == Guidance::News::none || !options_.log) return;
   LineBuffer line;
-  if (news == Guidance::News::path)
-    append(line, "guide: a path of length {:.4g}{}{}", guidance_->figures().length,
+  if (news == Guidance::News::path) {
+    append(line, "guide: a path of length {:.4g}", guidance_->figures().length);
+    if (const std::size_t options = goals_.goal().any_of.size(); options > 0)
+      append(line, " to option {} of {}", guidance_->figures().option + 1, options);
+    append(line, "{}{}",
            guidance_->cause().empty() ? "" : ", without a motion: ", guidance_->cause());
-  else
+  } else
     append(line, "guide: {}", guidance_->cause());
   // in a world that changes all the time, so does the search
   if (line.view() == guide_line_.view()) return;

@@ -75,6 +75,27 @@ void check_tip_goal(const scene::Goal& goal, std::size_t i) {
         fmt::format("tolerance_m: {} is not allowed, expected more than 0", goal.tolerance_m));
   check(goal.type != scene::GoalType::pose || goal.tolerance_rad > 0.0, i,
         fmt::format("tolerance_rad: {} is not allowed, expected more than 0", goal.tolerance_rad));
+  scene::check_region(goal, fmt::format("goal {}", i + 1));
+}
+
+void check_options(const scene::Goal& goal, std::size_t i, const scene::Scene& scene,
+                   const model::Model& model, std::size_t path_points_max) {
+  const std::span<const scene::Goal> options = scene::options_of(goal);
+  check(!options.empty(), i, "any_of: is empty, expected at least one goal");
+  check(options.size() <= scene::options_max, i,
+        fmt::format("any_of: {} goals given, expected at most {}", options.size(),
+                    scene::options_max));
+  for (const scene::Goal& option : options) {
+    if (option.type == scene::GoalType::joint)
+      check_joint_goal(option, i, scene, model, path_points_max);
+    else
+      check_tip_goal(option, i);
+    check(option.speed_max > 0.0, i,
+          fmt::format("speed_max: {} is not allowed, expected more than 0", option.speed_max));
+    check(&option == &goal || scene::is_option(option), i,
+          fmt::format("any_of: has a {} goal, expected joint, position or pose",
+                      scene::type_name(option)));
+  }
 }
 
 }  // namespace
@@ -82,14 +103,16 @@ void check_tip_goal(const scene::Goal& goal, std::size_t i) {
 GoalList::GoalList(std::uint64_t of_number, std::vector<scene::Goal> all,
                    std::vector<std::uint64_t> allowed, Motions of_goals, std::uint64_t of_load)
     : number(of_number),
-      goals(std::move(all)),
+      shared(std::make_shared<const std::vector<scene::Goal>>(std::move(all))),
+      goals(*shared),
       allowances(std::move(allowed)),
       motions(std::move(of_goals)),
       load(of_load) {
   for (const auto& goal : goals) for_planner.push_back(to_c(goal));
 }
 
-hamelin_goal to_c(const scene::Goal& goal) {
+hamelin_goal to_c(const scene::Goal& given) {
+  const scene::Goal& goal = scene::options_of(given).front();
   const bool joint = goal.type == scene::GoalType::joint;
   hamelin_goal out{};
   out.struct_size = sizeof out;
@@ -117,39 +140,37 @@ void check_goals(const std::vector<scene::Goal>& goals, const scene::Scene& scen
     throw Error(ErrorCode::invalid, "goals: none are given, expected at least one");
   for (std::size_t i = 0; i < goals.size(); ++i) {
     const scene::Goal& goal = goals[i];
-    if (goal.type == scene::GoalType::joint)
-      check_joint_goal(goal, i, scene, model, path_points_max);
-    else if (goal.type == scene::GoalType::follow)
+    if (goal.type == scene::GoalType::follow)
       check_follow_goal(goal, i, i + 1 == goals.size(), planner.follows_targets());
     else
-      check_tip_goal(goal, i);
+      check_options(goal, i, scene, model, path_points_max);
     check(!goal.trajectory || planner.follows_trajectories(), i,
           "trajectory: the planner does not follow trajectories, expected one that does, such as "
           "hybrid");
     scene::check(goal.may_touch, fmt::format("goal {}: may_touch", i + 1));
-    const std::string defect = constraints_defect(goal, scene, planner);
+    const std::string defect = path_defect(goal, scene, planner);
     check(defect.empty(), i, defect);
     for (std::size_t k = 0; k < goal.constraints.size(); ++k)
       scene::check(goal.constraints[k], fmt::format("goal {}: constraints: {}", i + 1, k + 1));
-    check(goal.speed_max > 0.0, i,
-          fmt::format("speed_max: {} is not allowed, expected more than 0", goal.speed_max));
   }
 }
 
-std::string constraints_defect(const scene::Goal& goal, const scene::Scene& scene,
-                               const planning::Plugin& planner) {
-  if (goal.constraints.empty()) return {};
+std::string path_defect(const scene::Goal& goal, const scene::Scene& scene,
+                        const planning::Plugin& planner) {
+  if (!scene::needs_path(goal)) return {};
   if (goal.constraints.size() > scene::constraints_max)
     return fmt::format("constraints: {} given, expected at most {}", goal.constraints.size(),
                        scene::constraints_max);
-  if (goal.type == scene::GoalType::follow || goal.path.size() > 0)
-    return fmt::format("constraints: are given for a {} goal, expected joint, position or pose",
-                       scene::type_name(goal));
+  if (!goal.constraints.empty() && (goal.type == scene::GoalType::follow || goal.path.size() > 0))
+    return fmt::format(
+        "constraints: are given for a {} goal, expected joint, position, "
+        "pose or any_of",
+        scene::type_name(goal));
   if (scene.guide.type == scene::GuideType::none || !planner.follows_paths())
     return fmt::format(
-        "constraints: planner '{}' moves without a path that keeps them, expected "
-        "one that follows paths, such as hybrid, and a guide",
-        planner.name());
+        "{}: planner '{}' moves without a path, expected one that follows paths, such as hybrid, "
+        "and a guide",
+        scene::path_need(goal), planner.name());
   return {};
 }
 

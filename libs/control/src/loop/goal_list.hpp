@@ -26,14 +26,16 @@ struct GoalList {
   GoalList& operator=(const GoalList&) = delete;
 
   std::uint64_t number;  ///< 0 for the goals of the scene; counts the lists that replaced them
-  std::vector<scene::Goal> goals;
+  std::shared_ptr<const std::vector<scene::Goal>> shared;
+  const std::vector<scene::Goal>& goals;  ///< the same
   std::vector<std::uint64_t> allowances;  ///< what each goal may touch, see World::allow()
   Motions motions;
   std::uint64_t load;                     ///< Answer::load for which the motions are proved
   std::vector<hamelin_goal> for_planner;  ///< the same; pointers refer to `goals`
 };
 
-/// A goal as planners see it. Its pointers refer to `goal`.
+/// A goal as planners see it; of several options the first stands for all. Its pointers refer to
+/// `goal`.
 [[nodiscard]] hamelin_goal to_c(const scene::Goal& goal);
 
 /// Sets what changes from tick to tick in a follow goal.
@@ -50,9 +52,10 @@ void check_goals(const std::vector<scene::Goal>& goals, const scene::Scene& scen
                  const model::Model& model, std::size_t path_points_max,
                  const planning::Plugin& planner);
 
-/// Why a goal's constraints cannot be kept with a scene's guide and this planner; empty: they can.
-[[nodiscard]] std::string constraints_defect(const scene::Goal& goal, const scene::Scene& scene,
-                                             const planning::Plugin& planner);
+/// Why a goal cannot be reached with a scene's guide and this planner, although it needs a path;
+/// empty: it can.
+[[nodiscard]] std::string path_defect(const scene::Goal& goal, const scene::Scene& scene,
+                                      const planning::Plugin& planner);
 
 /// What is wrong with the joints of a trajectory for this arm; empty if nothing is.
 [[nodiscard]] std::string joints_defect(const scene::JointTrajectory& trajectory,

@@ -1,6 +1,9 @@
 #include "hamelin/control/goal_tracker.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <limits>
+#include <span>
 
 namespace hamelin::control {
 
@@ -16,28 +19,52 @@ double tip_speed(const model::Model& model, const dynamics::Workspace& ws,
   return dynamics::point_velocity(model, ws, model.robot().tip.link, tip, v).norm();
 }
 
-}  // namespace
-
-GoalError goal_error(const scene::Goal& goal, const model::Model& model,
-                     const dynamics::Workspace& ws, const Eigen::VectorXd& q,
-                     const Eigen::VectorXd& v) {
+GoalError option_error(const scene::Goal& goal, const model::Model& model,
+                       const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                       const Eigen::VectorXd& v) {
   const bool slow = v.lpNorm<Eigen::Infinity>() < goal.speed_max;
   GoalError error;
-  if (goal.type == scene::GoalType::follow) return error;
   if (goal.type == scene::GoalType::joint) {
     error.radians = (q - goal.q).lpNorm<Eigen::Infinity>();
     error.reached = *error.radians < goal.tolerance_rad && slow;
     return error;
   }
   const geometry::SE3 tip = dynamics::tip_pose(model, ws);
-  error.metres = (tip.p() - goal.pose.p()).norm();
+  const geometry::SE3 wanted = scene::nearest_pose(goal, tip);
+  error.metres = (tip.p() - wanted.p()).norm();
   error.reached = *error.metres < goal.tolerance_m && slow &&
                   !(goal.tip_speed_max_m_s && !(tip_speed(model, ws, v) < *goal.tip_speed_max_m_s));
   if (goal.type == scene::GoalType::pose) {
-    error.radians = angle_between(tip.R(), goal.pose.R());
+    error.radians = angle_between(tip.R(), wanted.R());
     error.reached = error.reached && *error.radians < goal.tolerance_rad;
   }
   return error;
+}
+
+// In tolerances.
+double size_of(const GoalError& error, const scene::Goal& goal) {
+  return std::max(error.metres ? *error.metres / goal.tolerance_m : 0.0,
+                  error.radians ? *error.radians / goal.tolerance_rad : 0.0);
+}
+
+}  // namespace
+
+GoalError goal_error(const scene::Goal& goal, const model::Model& model,
+                     const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                     const Eigen::VectorXd& v) {
+  GoalError best;
+  if (goal.type == scene::GoalType::follow) return best;
+  const std::span<const scene::Goal> options = scene::options_of(goal);
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < options.size(); ++i) {
+    GoalError error = option_error(options[i], model, ws, q, v);
+    const double size = size_of(error, options[i]);
+    if (i > 0 && (best.reached || (!error.reached && !(size < least)))) continue;
+    least = size;
+    best = error;
+    best.option = i;
+  }
+  return best;
 }
 
 GoalError target_error(const scene::Goal& goal, const geometry::SE3& target,
@@ -64,8 +91,10 @@ bool GoalTracker::advance(const dynamics::Workspace& ws, const Eigen::VectorXd& 
 bool GoalTracker::stalled(const dynamics::Workspace& ws, const Eigen::VectorXd& v, double dt_s) {
   if (!rule_ || follows()) return false;
   bool away = true;
-  if (goal().type != scene::GoalType::joint)
-    away = (dynamics::tip_pose(*model_, ws).p() - goal().pose.p()).norm() > rule_->distance_m;
+  if (goal().type == scene::GoalType::position || goal().type == scene::GoalType::pose) {
+    const geometry::SE3 tip = dynamics::tip_pose(*model_, ws);
+    away = (tip.p() - scene::nearest_pose(goal(), tip).p()).norm() > rule_->distance_m;
+  }
   rest_s_ = tip_speed(*model_, ws, v) < rule_->speed_m_s && away ? rest_s_ + dt_s : 0.0;
   return rest_s_ >= rule_->hold_s;
 }

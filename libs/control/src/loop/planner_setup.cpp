@@ -31,7 +31,8 @@ void narrow(const scene::Scene& scene, const VectorXd& reserve, VectorXd& lower,
   };
   include(scene.start_q);
   for (const auto& goal : scene.goals)
-    if (goal.type == scene::GoalType::joint) include(goal.q);
+    for (const auto& option : scene::options_of(goal))
+      if (option.type == scene::GoalType::joint) include(option.q);
   lower += low;
   upper -= high;
 }
@@ -55,8 +56,11 @@ planning::SetupData planner_setup(const scene::Scene& scene, const model::Model&
                                   const WorldView& world, double control_period_s,
                                   const LimitReserve& reserve) {
   planning::SetupData data(nominal);
-  for (const auto& goal : scene.goals)
-    data.add_goal(to_c(goal), goal.type == scene::GoalType::joint ? goal.q : VectorXd(), goal.path);
+  for (const auto& goal : scene.goals) {
+    const scene::Goal& first = scene::options_of(goal).front();
+    data.add_goal(to_c(goal), first.type == scene::GoalType::joint ? first.q : VectorXd(),
+                  first.path);
+  }
   ModelledLimits limits = modelled_limits(scene, nominal.robot());
   if (limits.q_lower.size() > 0 && reserve.position.size() > 0)
     narrow(scene, reserve.position, limits.q_lower, limits.q_upper);

@@ -84,6 +84,15 @@ void check_bounds(const scene::Scene& scene) {
   within(actuation.deadline_s.value_or(1.0), 0.0, large, "/actuation/deadline_s");
 }
 
+// Calls `sized` with the joints of a goal, or of its options, and where they stand.
+template <class Sized>
+void each_joints(const scene::Goal& goal, const std::string& place, const Sized& sized) {
+  for (std::size_t k = 0; k < goal.any_of.size(); ++k)
+    each_joints(goal.any_of[k], fmt::format("{}/any_of/{}", place, k), sized);
+  if (goal.type == scene::GoalType::joint)
+    sized(goal.q, place + (goal.path.size() > 0 ? "/q/0" : "/q"));
+}
+
 }  // namespace
 
 void check_numbers(const scene::Scene& scene, const model::Model& model) {
@@ -101,9 +110,9 @@ void check_numbers(const scene::Scene& scene, const model::Model& model) {
       if (const std::string defect = joints_defect(*scene.goals[i].trajectory, model);
           !defect.empty())
         throw Error(ErrorCode::invalid, fmt::format("{}: /goals/{}: {}", scene.name, i, defect));
-    } else if (scene.goals[i].type == scene::GoalType::joint)
-      sized(scene.goals[i].q,
-            fmt::format("/goals/{}/q{}", i, scene.goals[i].path.size() > 0 ? "/0" : ""));
+    } else {
+      each_joints(scene.goals[i], fmt::format("/goals/{}", i), sized);
+    }
   if (scene.actuation.coulomb_friction_share > 0.0)
     for (const auto& link : model.robot().links)
       if (!link.joint.effort_max)

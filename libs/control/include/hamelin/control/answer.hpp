@@ -125,10 +125,11 @@ struct ShieldReport {
 /// What a scene's guide did since the start.
 struct GuideFigures {
   long searches = 0, found = 0;
-  long kept = 0;        ///< paths that were still clear after a change of the world
-  long checks = 0;      ///< of all answers
-  double waited_s = 0;  ///< for which the arm held its place
-  double length = 0;    ///< of the last path [rad or m]
+  long kept = 0;           ///< paths that were still clear after a change of the world
+  long checks = 0;         ///< of all answers
+  double waited_s = 0;     ///< for which the arm held its place
+  double length = 0;       ///< of the last path [rad or m]
+  std::size_t option = 0;  ///< of several goals the one that it leads to
 };
 
 /// The lines that a planner drew in the last tick in which it drew any: their points [m], line by

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -13,7 +14,8 @@ struct GoalError {
   std::optional<double> metres;  ///< of the tip, for position and pose goals
   /// Of the tip's rotation for pose goals; the largest of all joints for joint goals.
   std::optional<double> radians;
-  bool reached = false;  ///< within the goal's tolerances, speeds included
+  bool reached = false;    ///< within the goal's tolerances, speeds included
+  std::size_t option = 0;  ///< of several the nearest, measured by their tolerances
 };
 
 /// Error of a goal. `ws` must have the poses of q by this model. A follow goal has none of its own,

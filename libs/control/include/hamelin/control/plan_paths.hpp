@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 #include "hamelin/control/world.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/scene/scene.hpp"
+#include "hamelin/search/postures.hpp"
 #include "hamelin/search/search.hpp"
 #include "hamelin/timing/timed_path.hpp"
 
@@ -23,6 +25,7 @@ struct PlannedMotion {
 /// The path to one goal of a scene, with its certificate.
 struct PlannedGoal {
   std::string type;  ///< of the goal, as in a scene file
+  bool has_way = false;
   search::Path path;
   /// For each straight line of the path, the smallest distance of the arm from obstacles and from
   /// itself that is proved, but for 0.1 mm [m]; at most 0.2 m.
@@ -61,6 +64,11 @@ struct PlanOptions {
 /// The same with the scene's model and a world that were made before.
 [[nodiscard]] PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& world,
                                   const PlanOptions& options = {});
+/// Configurations at a goal of a scene that are clear in the world as it is at time 0.
+/// @param goal its index
+/// @throws Error as plan_paths(), and invalid for an index beyond the last goal
+[[nodiscard]] search::Postures find_postures(const scene::Scene& scene, std::size_t goal,
+                                             const search::PosturesWanted& wanted);
 /// The motions of all goals, one after the other, at times that are at most `spacing_s` apart.
 /// @throws Error invalid if there is none to some goal, with the cause
 [[nodiscard]] scene::JointTrajectory trajectory_of(const PathPlan& plan, double spacing_s);

@@ -109,8 +109,9 @@ struct Result {
   /// What the tip has to keep on the way to a goal.
   struct Constraint {
     std::size_t goal = 0, constraint = 0;  ///< the first have number 1
-    std::string type;                      ///< "axis" or "box"
-    /// By how much it was exceeded at most, negative if it was kept [rad or m], and when.
+    std::string type;                      ///< "axis", "box" or "speed"
+    /// By how much it was exceeded at most, negative if it was kept [rad, m or m/s], and
+    /// when.
     double excess = 0.0, time_s = 0.0;
   };
   std::vector<Constraint> constraints;

@@ -11,8 +11,8 @@
 #include "hamelin/geometry/se3.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/model/model.hpp"
-#include "hamelin/scene/allowance.hpp"
 #include "hamelin/scene/environment.hpp"
+#include "hamelin/scene/goal.hpp"
 #include "hamelin/scene/joint_trajectory.hpp"
 #include "hamelin/scene/motion.hpp"
 #include "hamelin/scene/obstacles.hpp"
@@ -28,73 +28,6 @@ struct RobotRef {
   std::optional<std::filesystem::path> spheres;  ///< sidecar file
   std::optional<std::filesystem::path> srdf;  ///< its disabled pairs are not checked for collision
 };
-
-/// follow: a target that moves, which the tip follows until the run ends.
-enum class GoalType : std::int32_t { joint, position, pose, follow };
-
-[[nodiscard]] std::string_view to_string(GoalType type) noexcept;
-
-/// What is done where a streamed target is lost. hold: the arm holds its place where it can, and
-/// resumes with the stream; end: the run ends.
-enum class WhenLost : std::int32_t { hold, end };
-
-[[nodiscard]] std::string_view to_string(WhenLost when) noexcept;
-
-/// A target whose poses or twists arrive while the arm moves, and bounds of what is believed.
-struct TargetStream {
-  std::filesystem::path file;  ///< JSON lines; empty: the program that runs the scene has them
-  double gap_max_s = 0.2;      ///< after a longer time without a new line the target is lost
-  /// Largest distance of a pose from where the target is expected by its last motion.
-  double jump_max_m = 0.1, jump_max_rad = 0.5;
-  /// Standard deviation of poses per axis, which are smoothed if the stream has no velocities.
-  double noise_m = 0.0005, noise_rad = 0.002;
-  /// Targets that are commanded by twists stay so near to the tip.
-  double leash_m = 0.05, leash_rad = 0.3;
-  WhenLost when_lost = WhenLost::hold;
-};
-
-/// The largest number of constraints of a goal.
-inline constexpr std::size_t constraints_max = 8;
-
-struct Goal {
-  GoalType type = GoalType::joint;
-  Eigen::VectorXd q;  ///< joint [rad or m]
-  /// Joint, if given as a path or a trajectory: way-points as columns, q the last; else empty.
-  Eigen::MatrixXd path;
-  std::filesystem::path path_file;  ///< that these were read from; empty: the scene file
-  /// Joint, if given as a trajectory: the motion to q, whose points are the path.
-  std::optional<JointTrajectory> trajectory;
-  /// Position, pose: of the tip in the world; rotation unused for position. Follow: of the target
-  /// at rest, see Frame::pose.
-  geometry::SE3 pose;
-  Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};  ///< see Quaternion
-  double tolerance_m = 0.0;                        ///< position 0.02, pose 0.01, follow 0.01
-  double tolerance_rad = 0.0;                      ///< joint 0.05, pose 0.26, follow 0.1
-  /// Largest |v_i| at arrival; joint 0.05, else none.
-  double speed_max = std::numeric_limits<double>::infinity();
-  std::optional<double> tip_speed_max_m_s;  ///< position, pose: of the tip at arrival
-  bool position_only = false;               ///< follow: whether the orientation is free
-  std::optional<Motion> motion;             ///< follow: of the target; none: it is streamed
-  TargetStream stream;                      ///< follow without a motion
-  Allowance may_touch;                      ///< while this goal is the current one
-  std::vector<TipConstraint> constraints;   ///< kept on the way to it; at most constraints_max
-};
-
-/// Goals with the tolerances that a scene file gets by default.
-[[nodiscard]] Goal joint_goal(Eigen::VectorXd q);
-/// @throws Error invalid as check(trajectory) does
-[[nodiscard]] Goal trajectory_goal(JointTrajectory trajectory);
-/// @throws Error as read_joint_trajectory() does
-[[nodiscard]] Goal trajectory_goal(const std::filesystem::path& file);
-[[nodiscard]] Goal position_goal(const Eigen::Vector3d& position_m);
-[[nodiscard]] Goal pose_goal(const geometry::SE3& pose);
-
-/// A goal that follows a target that is streamed.
-[[nodiscard]] Goal follow_goal(bool position_only = false, const TargetStream& stream = {});
-
-/// The goal's "type" in a scene file: "path" is a joint goal with way-points, "trajectory" one
-/// whose way-points have times.
-[[nodiscard]] std::string_view type_name(const Goal& goal) noexcept;
 
 /// One value per joint.
 struct JointNumbers {
@@ -211,9 +144,9 @@ struct GuideSpec {
   /// Clearance that paths keep away from the start and goals [m]; none: somewhat more than the
   /// planner's margin.
   std::optional<double> margin_m;
-  long checks_max = 200000;  ///< after which a search ends without a path
+  long checks_max = 200000;    ///< after which a search ends without a path
   long improve_checks = 2000;  ///< for which a path is improved after it was found
-  int searches_max = 5;      ///< of a goal, after stalls
+  int searches_max = 5;        ///< of a goal, after stalls
   /// Simulated time that a check takes [s]. With real time nothing is charged.
   double check_time_s = 2e-6;
 };

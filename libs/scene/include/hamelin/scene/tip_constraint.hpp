@@ -26,10 +26,21 @@ struct BoxConstraint {
   Eigen::Vector3d high_m = Eigen::Vector3d::Zero();  ///< above low_m; may be ∞
 };
 
-/// What the tip keeps on the whole way to a goal.
-using TipConstraint = std::variant<AxisConstraint, BoxConstraint>;
+/// The tip's point is no faster.
+struct SpeedConstraint {
+  double m_s = 0.0;  ///< above 0
+};
 
-/// "axis", "box"
+/// What the tip keeps on the whole way to a goal.
+using TipConstraint = std::variant<AxisConstraint, BoxConstraint, SpeedConstraint>;
+
+/// The largest speed that constraints allow [m/s]; infinite without one of speed.
+[[nodiscard]] double speed_max_m_s(const std::vector<TipConstraint>& constraints) noexcept;
+
+/// The unit in which a constraint of this type is exceeded: "rad", "m", "m/s".
+[[nodiscard]] std::string_view unit_of(std::string_view type) noexcept;
+
+/// "axis", "box", "speed"
 [[nodiscard]] std::string_view type_name(const TipConstraint& constraint) noexcept;
 
 /// @throws Error invalid, "where: what is wrong", for numbers that are not finite or out of their

@@ -1,13 +1,16 @@
 #pragma once
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "hamelin/search/query.hpp"
+#include "hamelin/search/tip_curve.hpp"
 
 namespace hamelin::search {
 
@@ -37,21 +40,45 @@ struct Problem {
   /// changed; what is still clear of it is where the search begins. May be empty, and is ignored if
   /// its end is no longer a goal.
   Eigen::MatrixXd known{};
+  /// The whole way of the tip to the only goal, to its tolerance; then nothing is searched besides
+  /// how the joints follow it.
+  std::optional<TipCurve> way{};
+  /// What the path begins with.
+  std::optional<scene::Stretch> retreat{};
+  /// Whether the first path is shortened; then only the query keeps the tip on an approach or a
+  /// retreat.
+  bool shortens = true;
 };
+
+/// What a search found of one of its goals.
+struct GoalFigures {
+  long tried = 0;      ///< attempts to find a configuration there
+  long reached = 0;    ///< of them, those that found one, whatever it touches
+  long exceeding = 0;  ///< of these, those at which the tip exceeds a constraint
+  long clear = 0;      ///< and those that keep all constraints and the clearance asked for
+  long blocked = 0;    ///< of these, those whose approach is not clear
+};
+
+/// One line: why a goal was not the one that a path leads to.
+[[nodiscard]] std::string why_not(const GoalFigures& goal);
 
 /// What a search found.
 struct Path {
   /// dof × number of way-points, from the start to a configuration within the tolerances of a goal;
   /// empty: none was found. Every straight line between two of them was proved clear.
   Eigen::MatrixXd points;
-  double length = 0.0;      ///< [rad or m], in the Euclidean norm
-  Eigen::MatrixXd planned;  ///< what was found first, before it was shortened
-  double margin_m = 0.0;    ///< the full margin that it keeps, see Settings::margin_m
-  long checks = 0;          ///< of the whole search, with steps of inverse kinematics
-  long first_checks = 0;    ///< until the first path was found
-  int roots = 0;            ///< configurations at the goals
-  long states = 0;          ///< nodes of the trees
-  std::string cause;        ///< one line: why none was found
+  double length = 0.0;               ///< [rad or m], in the Euclidean norm
+  Eigen::MatrixXd planned;           ///< what was found first, before it was shortened
+  double margin_m = 0.0;             ///< the full margin that it keeps, see Settings::margin_m
+  long checks = 0;                   ///< of the whole search, with steps of inverse kinematics
+  long first_checks = 0;             ///< until the first path was found
+  int roots = 0;                     ///< configurations at the goals
+  double way_share = 0.0;            ///< of Problem::way, how much was proved
+  Eigen::MatrixXd way{};             ///< as points, the part of it that was proved, if not all was
+  std::size_t goal = 0;              ///< index of the one that it leads to
+  std::vector<GoalFigures> goals{};  ///< of all, in their order
+  long states = 0;                   ///< nodes of the trees
+  std::string cause;                 ///< one line: why none was found
   [[nodiscard]] bool found() const noexcept { return points.cols() > 0; }
 };
 

@@ -2,14 +2,20 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "hamelin/dynamics/inverse_kinematics.hpp"
+#include "hamelin/scene/goal.hpp"
 #include "hamelin/scene/levers.hpp"
 #include "hamelin/scene/tip_constraint.hpp"
+#include "hamelin/search/tip_curve.hpp"
 
 namespace hamelin::search {
+
+class TipRule;
 
 /// What the tip keeps on a path, docs/theory.md, chapter 21: measures it, proves it on straight
 /// joint motions and brings configurations to where it is kept. Plans use somewhat less than the
@@ -23,7 +29,23 @@ class TipConstraints {
   /// Deleted: a temporary model is gone before any call could use it.
   TipConstraints(const model::Model&& model, const std::vector<scene::TipConstraint>&) = delete;
 
-  [[nodiscard]] std::size_t size() const noexcept { return kept_.size(); }
+  TipConstraints(const TipConstraints&) = delete;
+  TipConstraints& operator=(const TipConstraints&) = delete;
+  ~TipConstraints();
+
+  struct Ball {
+    Eigen::Vector3d center_m;
+    double radius_m;
+  };
+  /// Adds that the tip keeps to a curve and its rotation. @param within only where its point is in
+  /// a ball; none: everywhere, and without going back
+  void add(const TipCurve& curve, const scene::WayTolerance& tolerance,
+           const std::optional<Ball>& within = {});
+
+  /// How many are kept by paths: all but those of speed, which are kept by motions.
+  [[nodiscard]] std::size_t size() const noexcept { return rules_.size(); }
+  /// Which of the given ones it is; the first has number 1.
+  [[nodiscard]] std::size_t number(std::size_t k) const noexcept { return numbers_[k]; }
   /// Where the tip is beyond a tolerance.
   struct Excess {
     std::size_t constraint = 0;
@@ -38,6 +60,10 @@ class TipConstraints {
   /// Upper bounds of the excess of each constraint on the straight joint motion from a to b, [rad]
   /// of an axis or [m] of a box, which are exact if both are equal.
   void measure(const Eigen::VectorXd& a, const Eigen::VectorXd& b, std::vector<double>& by);
+
+  /// An upper bound of the way of the tip's point on the straight joint motion from a to b, per
+  /// unit of its parameter, everywhere on it [m].
+  [[nodiscard]] double largest_way(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
 
   /// Plans may also use what a configuration uses, as the start of a path, and somewhat more, up to
   /// the tolerances.
@@ -59,47 +85,32 @@ class TipConstraints {
   [[nodiscard]] long checks() const noexcept { return checks_; }
 
  private:
-  /// An axis, or a point in a box, by its components in a frame: of an axis along z.
-  struct Kept {
-    bool is_axis;
-    Eigen::Vector3d axis;        ///< in the tip's frame
-    Eigen::Matrix3d from_world;  ///< rotation to the components
-    Eigen::Vector3d origin;      ///< of the box
-    double angle, plan_angle;    ///< between the axis and z
-    Eigen::Vector3d low, high, plan_low, plan_high;
-    double reserve;  ///< what plans leave of the tolerance [rad or m]
-  };
-  using Values = std::vector<Eigen::Vector3d>;
+  using Values = std::vector<Eigen::Matrix<double, 6, 1>>;
   static constexpr int depth_max = 12;
 
+  void add(std::unique_ptr<TipRule> rule, std::size_t number);
   /// Sets by how much values may stray on a motion.
   void set_motion(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& stray);
   void place(const Eigen::VectorXd& q, Values& out);
   /// By how much a deviation of the joints turns the tip at most.
   [[nodiscard]] double turn_of(const Eigen::VectorXd& deviation) const;
-  [[nodiscard]] static Eigen::Vector3d value_of(const Kept& kept, const geometry::SE3& tip);
-  [[nodiscard]] static double excess_of(const Kept& kept, const Eigen::Vector3d& value);
-  /// Whether plans keep it at both values and anywhere that is no farther than `stray` from the
-  /// segment between them.
-  [[nodiscard]] bool within_plan(std::size_t k, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                                 double width) const;
+  /// Whether plans keep all on a piece of a motion, of some width.
+  [[nodiscard]] bool plans_keep(const Values& a, const Values& b, double width) const;
   [[nodiscard]] bool piece_keeps(double from, double to, const Values& a, const Values& b,
                                  int depth);
-  /// Appends what moves the tip to where the constraint is well kept.
-  void add_rows(const Kept& kept, const Eigen::Vector3d& value);
 
   const model::Model& model_;
   scene::Levers levers_;
   dynamics::Workspace ws_;
   geometry::SE3 tip_;
-  std::vector<Kept> kept_;
+  std::vector<std::unique_ptr<TipRule>> rules_;
+  std::vector<std::size_t> numbers_;
   Values from_, to_;
   std::array<Values, depth_max> middle_;
   Eigen::VectorXd start_, dq_, q_, curvature_, step_, error_;
   double bend_rad_ = 0.0, bend_m_ = 0.0, stray_rad_ = 0.0, stray_m_ = 0.0;
   dynamics::Matrix6Xd J_;
   Eigen::MatrixXd rows_;
-  Eigen::Index row_count_ = 0;
   long checks_ = 0;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <limits>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -16,8 +17,9 @@ struct Limits {
   Eigen::VectorXd acceleration;  ///< [rad/s² or m/s²]; always given
   Eigen::VectorXd torque;        ///< [Nm or N]
   /// Rates of change; where neither is bounded, accelerations jump.
-  Eigen::VectorXd jerk;         ///< [rad/s³ or m/s³]
-  Eigen::VectorXd torque_rate;  ///< [Nm/s or N/s]
+  Eigen::VectorXd jerk;                                        ///< [rad/s³ or m/s³]
+  Eigen::VectorXd torque_rate;                                 ///< [Nm/s or N/s]
+  double tip_speed = std::numeric_limits<double>::infinity();  ///< of the tip's point [m/s]
   [[nodiscard]] bool have_rates() const noexcept {
     return jerk.size() > 0 || torque_rate.size() > 0;
   }
@@ -59,6 +61,8 @@ class TimeLaw {
   /// At how many places of the curve the last call has evaluated torques.
   [[nodiscard]] long evaluated() const noexcept { return evaluated_; }
   [[nodiscard]] const Limits& limits() const noexcept { return limits_; }
+  /// Of the following motions. @param m_s above 0; infinite: none
+  void set_tip_speed(double m_s) noexcept { limits_.tip_speed = m_s; }
 
  private:
   /// u between two bounds for each x: what a row of limits allows on an interval.
@@ -71,10 +75,13 @@ class TimeLaw {
   /// q′, q″ and, of (19.4), A, B and g at places of a curve.
   struct Rows {
     dynamics::StatesXd tangent, curvature, inertia, bias, gravity;
+    Eigen::VectorXd tip;  ///< |J q′| of the tip's point, if its speed is bounded
   };
   void set_nodes(const Curve& curve);
   /// The same for one whose q″ may jump.
   void set_nodes_beside_jumps(const Curve& curve);
+  /// Sets what moves the tip's point at the places of the rows.
+  void evaluate_tip(Rows& out);
   void add_nodes(double from, double to, Eigen::Index count);
   /// @param torques whether A, B and g are needed
   void evaluate(const Curve& curve, const Eigen::VectorXd& places, bool torques, Rows& out);
@@ -109,6 +116,7 @@ class TimeLaw {
   Limits limits_;
   Grid grid_;
   dynamics::BatchWorkspace ws_;
+  dynamics::Workspace one_;
   std::string_view cause_;
   long evaluated_ = 0;
   std::vector<double> nodes_;

@@ -19,6 +19,9 @@ class WayPoints {
   WayPoints(const model::Model& model, const scene::Levers& levers, const Limits& limits,
             Eigen::VectorXd q_lower, Eigen::VectorXd q_upper);
 
+  /// As TimeLaw::set_tip_speed().
+  void set_tip_speed(double m_s) noexcept { law_.set_tip_speed(m_s); }
+
   struct Effort {
     int tries = 300;       ///< changes that are tried
     long checks = 100000;  ///< of the query, at most about so many
