@@ -112,4 +112,49 @@ void Curve::include_bend(Index piece, double from, double to, VectorXd& bend) co
   }
 }
 
+void Curve::add(const Curve& curve) {
+  Eigen::MatrixXd c(dof_, degree_ + 1);
+  for (Index k = 0; k < curve.pieces(); ++k) {
+    c.setZero();
+    for (int power = 0; power <= curve.degree_; ++power)
+      c.col(power) = Eigen::Map<const VectorXd>(curve.coefficient(k, power), dof_);
+    add(curve.knot(k + 1) - curve.knot(k), c);
+  }
+}
+
+// A polynomial of x by powers of x − d: c_i gets Σ_k binomial(k, i) d^(k − i) c_k.
+Curve Curve::part(double from, double to) const {
+  Curve out(dof_, degree_);
+  for (Index k = 0; k < pieces(); ++k) {
+    const double begin = std::max(from, knot(k)), end = std::min(to, knot(k + 1));
+    if (!(end > begin)) continue;
+    Eigen::MatrixXd c(dof_, degree_ + 1);
+    for (int power = 0; power <= degree_; ++power)
+      c.col(power) = Eigen::Map<const VectorXd>(coefficient(k, power), dof_);
+    const double d = begin - knot(k);
+    for (int i = 0; i < degree_; ++i)
+      for (int j = degree_ - 1; j >= i; --j) c.col(j) += d * c.col(j + 1);
+    out.add(end - begin, c);
+  }
+  return out;
+}
+
+double Curve::next_straight(double from) const {
+  constexpr double zero = 1e-9;
+  VectorXd q(dof_), dq(dof_), before(dof_), behind(dof_);
+  for (Index k = 1; k < pieces(); ++k) {
+    const double at_knot = knot(k);
+    if (at_knot < from) continue;
+    at(at_knot, q, dq, behind, k);
+    const double h = knot(k) - knot(k - 1);
+    before.setZero();
+    for (int power = degree_; power >= 2; --power)
+      before = h * before + static_cast<double>(power * (power - 1)) *
+                                Eigen::Map<const VectorXd>(coefficient(k - 1, power), dof_);
+    if (before.lpNorm<Eigen::Infinity>() < zero && behind.lpNorm<Eigen::Infinity>() < zero)
+      return at_knot;
+  }
+  return end();
+}
+
 }  // namespace hamelin::timing

@@ -22,6 +22,15 @@ void TimedPath::at(double t, VectorXd& q, VectorXd& v, VectorXd& a, Cursor& curs
   v *= w;
 }
 
+TimedPath::Along TimedPath::along(double t) const {
+  t = std::clamp(t, 0.0, duration_s());
+  Index i = 0;
+  while (i + 2 < nodes() && time_s[i + 1] <= t) ++i;
+  const double dt = t - time_s[i];
+  return {place[i] + dt * (speed[i] + dt * (0.5 * rate[i] + dt * ramp[i] / 6.0)),
+          speed[i] + dt * (rate[i] + 0.5 * dt * ramp[i])};
+}
+
 void TimedPath::chord(Index interval, VectorXd& from, VectorXd& to, VectorXd& stray) const {
   const double a = place[interval], b = place[interval + 1];
   curve.at(a, from, stray, to);

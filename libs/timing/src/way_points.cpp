@@ -82,9 +82,10 @@ void WayPoints::predict(const BlendedPath& now, const Change& changed, BlendedPa
   }
 }
 
-WayPoints::Change WayPoints::change(const MatrixXd& from, Rng& rng) {
+WayPoints::Change WayPoints::change(const MatrixXd& from, Index fixed, Rng& rng) {
   const Index n = from.cols(),
-              inner = 1 + static_cast<Index>(rng.below(static_cast<std::uint64_t>(n - 2)));
+              inner =
+                  fixed + static_cast<Index>(rng.below(static_cast<std::uint64_t>(n - 1 - fixed)));
   const double kind = rng.uniform();
   trial_ = from;
   if (kind < removals && n > 3) {
@@ -93,7 +94,8 @@ WayPoints::Change WayPoints::change(const MatrixXd& from, Rng& rng) {
     return {inner - 1, inner - 1};
   }
   if (kind < additions && n < points_usual) {
-    const auto line = static_cast<Index>(rng.below(static_cast<std::uint64_t>(n - 1)));
+    const auto line =
+        fixed - 1 + static_cast<Index>(rng.below(static_cast<std::uint64_t>(n - fixed)));
     trial_.resize(from.rows(), n + 1);
     trial_ << from.leftCols(line + 1), 0.5 * (from.col(line) + from.col(line + 1)),
         from.rightCols(n - 1 - line);
@@ -134,8 +136,9 @@ double WayPoints::improve(BlendedPath& path, const search::Margins& margins, sea
   double best = law_.duration_s(path.curve());
   const long until = query.checks() + effort.checks;
   spread_ = first_spread;
-  for (int k = 0; k < effort.tries && path.corners() > 0 && query.checks() < until; ++k) {
-    const Change changed = change(path.points(), rng);
+  for (int k = 0; k < effort.tries && path.corners() >= effort.fixed && query.checks() < until;
+       ++k) {
+    const Change changed = change(path.points(), effort.fixed, rng);
     if (!keep_constraints(changed, query) || !are_apart(trial_)) continue;
     BlendedPath candidate(trial_);
     predict(path, changed, candidate);

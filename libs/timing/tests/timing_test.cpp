@@ -295,6 +295,43 @@ TEST_CASE("a moving start goes on at its speed, or is refused", "[timing][unit]"
   CHECK(law.cause() == "the arm is too fast at the beginning of the path");
 }
 
+TEST_CASE("a part of a curve is the curve, and may go on with another", "[timing][unit]") {
+  Rng rng(11);
+  const timing::Curve curve = blended(random_points(4, 5, rng), 0.8).curve();
+  const double from = 0.23 * curve.end(), to = 0.81 * curve.end();
+  timing::Curve part = curve.part(from, to);
+  CHECK(part.end() == Approx(to - from));
+  State a(4), b(4);
+  for (double s = from; s <= to; s += 0.01 * (to - from)) {
+    curve.at(s, a.q, a.v, a.a);
+    part.at(s - from, b.q, b.v, b.a);
+    CHECK((a.q - b.q).norm() < 1e-12);
+    CHECK((a.v - b.v).norm() < 1e-12);
+    CHECK((a.a - b.a).norm() < 1e-10);
+  }
+  part.add(curve.part(to, curve.end()));
+  CHECK(part.is_smooth());
+  CHECK(part.end() == Approx(curve.end() - from));
+  curve.at(curve.end(), a.q, a.v, a.a);
+  part.at(part.end(), b.q, b.v, b.a);
+  CHECK((a.q - b.q).norm() < 1e-12);
+}
+
+TEST_CASE("the next straight place of a curve is where a blend ends", "[timing][unit]") {
+  Rng rng(12);
+  const MatrixXd points = random_points(3, 5, rng);
+  const timing::BlendedPath path = blended(points, 0.6);
+  const timing::Curve curve = path.curve();
+  for (Index i = 1; i <= path.corners(); ++i) {
+    const double end = path.begin(i) + path.half_length(i);
+    CHECK(curve.next_straight(path.begin(i)) == Approx(end));
+    State at(3);
+    curve.at(end, at.q, at.v, at.a);
+    CHECK(at.a.norm() < 1e-9);
+  }
+  CHECK(curve.next_straight(0.999 * curve.end()) == curve.end());
+}
+
 TEST_CASE("what has no motion says why", "[timing][unit]") {
   const model::Model arm(model::make_chain({3}));
   MatrixXd points(3, 3);

@@ -164,6 +164,47 @@ TEST_CASE("a planner asks for a path at each goal, as often as the scene allows"
   CHECK(reactive.controller.guide_figures()->waited_s == 0.0);
 }
 
+TEST_CASE("another goal in motion is gone to at speed, without a jump of the acceleration's bound",
+          "[control][guide][allocation]") {
+  control::Controller::Options options;
+  options.guide_thread = false;
+  const scene::Scene scene = guided_scene();
+  Loop loop(scene, options, no_escape);
+  long allocations = 0;
+  double largest_change = 0.0;
+  const auto advance = [&] {
+    const control::Answer* answer = nullptr;
+    const long made = test::allocations_in([&] { answer = &loop.tick(); });
+    if (loop.state.k > 0) allocations += made;
+    const control::ControlState state = answer->state;
+    const VectorXd before = loop.v;
+    loop.step(answer->torque);
+    largest_change = std::max(largest_change, (loop.v - before).lpNorm<Eigen::Infinity>());
+    loop.controller.run_guide();
+    return state;
+  };
+  while (loop.v.norm() < 1.2 && loop.state.k < 2000) (void)advance();
+  const double speed = loop.v.norm();
+  REQUIRE(speed >= 1.2);
+  scene::Goal other = scene.goals.front();
+  REQUIRE(other.type == scene::GoalType::joint);
+  other.q[0] += 0.2;
+  loop.controller.set_goal(other);
+  double slowest = speed;
+  for (int k = 0; k < 40; ++k) {
+    (void)advance();
+    slowest = std::min(slowest, loop.v.norm());
+  }
+  CHECK(slowest > 0.95 * speed);
+  control::ControlState state = control::ControlState::running;
+  while (state == control::ControlState::running && loop.state.k < 6000) state = advance();
+  CHECK(state == control::ControlState::reached);
+  CHECK(loop.controller.guide_figures()->waited_s < 0.05);
+  constexpr double acceleration = 40.0;  // that of motions by default
+  CHECK(largest_change < 1.05 * 0.001 * acceleration);
+  if (test::counts_allocations()) CHECK(allocations == 0);
+}
+
 TEST_CASE("planners that follow no paths are shown their way-points", "[control][guide]") {
   const scene::GuideSpec spec{scene::GuideType::rrt_connect, {}, 1000, 0, 1, 0.0};
   CHECK(planning::find_plugin("hybrid", {HAMELIN_TEST_PLUGIN_DIR}).follows_paths());
@@ -181,12 +222,14 @@ TEST_CASE("planners that follow no paths are shown their way-points", "[control]
           nullptr, 0),
       64, false);
   const auto goals = std::make_shared<const std::vector<scene::Goal>>(scene.goals);
+  const control::ReferenceState rest{};
   for (const bool follows : {true, false}) {
     control::Guidance guidance(spec, loop.arm.dof(), 64, follows, false);
     VectorXd q = scene.start_q;
     const auto update = [&](double time_s) {
       const auto news = guidance.update(
-          {time_s, 0.001, q, goals, 0, follows ? 1U : 2U, 0, 0, nullptr, nullptr}, search);
+          {time_s, 0.001, q, goals, 0, follows ? 1U : 2U, 0, 0, nullptr, nullptr, nullptr, rest},
+          search);
       search.run();
       return news;
     };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
 
 #include "loop/goal_list.hpp"
 
@@ -21,6 +22,11 @@ constexpr double moved_on = 1.0;
 // Tolerance of what the planner is shown. Whether a goal is reached does not depend on it.
 constexpr double shown_tolerance = 0.02;
 constexpr std::size_t cause_max = 256;
+// A new goal in motion: from when on another motion is asked for at first, and how long it may take
+// to be found [s]; the arm goes on along the one before.
+constexpr double ahead_first_s = 0.06, ahead_most_s = 0.5;
+// The rate of the clock below which an arm does not go on at speed.
+constexpr double full_rate = 0.98;
 
 }  // namespace
 
@@ -38,8 +44,11 @@ Guidance::News Guidance::update(const Now& now, GuideSearch& search) {
   if (goal_number_ != now.goal_number) begin(now);
   if (mode_ == Mode::off) return News::none;
   News news = News::none;
+  beginning_ = {};
   if (awaits_) news = take(now, search);
-  if (!follows() && !awaits_ && !wants_ && world_ != now.world) wants_ = true;
+  if (lead_ == LeadState::found) news = go_over(now);
+  if (!follows() && lead_ == LeadState::none && !awaits_ && !wants_ && world_ != now.world)
+    wants_ = true;
   if (wants_ && !search.busy()) ask(now, search);
   if (!follows() && mode_ == Mode::waiting) figures_.waited_s += now.period_s;
   if (mode_ == Mode::guided && !follows_paths_) show_next_point(now);
@@ -52,19 +61,35 @@ void Guidance::begin(const Now& now) {
   goal_number_ = now.goal_number;
   follows_ = now.goal().type == scene::GoalType::follow;
   needs_path_ = scene::needs_path(now.goal());
+  const bool leads = may_lead(now);
   const bool guided = needs_path_ || (spec_.type != scene::GuideType::on_request && !follows() &&
                                       now.goal().path.cols() == 0);
-  mode_ = guided ? Mode::waiting : Mode::off;
+  lead_ = guided && leads ? LeadState::sought : LeadState::none;
+  ahead_s_ = ahead_first_s;
+  mode_ = !guided ? Mode::off : leads ? Mode::guided : Mode::waiting;
   goal_start_ = now.q;
   awaits_ = false;
   wants_ = guided;
   searches_ = guided ? 1 : 0;
+  if (lead_ == LeadState::sought) return;
   ++number_;
   if (guided) hold(now);
 }
 
+bool Guidance::may_lead(const Now& now) const {
+  const scene::Goal& goal = now.goal();
+  const std::span<const scene::Goal> options = scene::options_of(goal);
+  return mode_ == Mode::guided && follows_paths_ && motion_ && now.followed == motion_.get() &&
+         motion_->braking_ramp == 0.0 && now.reference.rate > full_rate &&
+         now.reference.time_s + ahead_first_s < motion_->motion.duration_s() && !goal.way &&
+         !goal.retreat && std::none_of(options.begin(), options.end(), [](const auto& option) {
+           return option.approach.has_value();
+         });
+}
+
 bool Guidance::request() {
   if (mode_ == Mode::waiting) return true;
+  lead_ = LeadState::none;
   if (!follows() && searches_ >= spec_.searches_max) return false;
   ++searches_;
   mode_ = Mode::waiting;
@@ -94,7 +119,11 @@ void Guidance::ask(const Now& now, GuideSearch& search) {
   if (follows() && now.target != nullptr) request.target = now.target->pose;
   request.search = asked_;
   request.kept_count = 0;
-  if (mode_ == Mode::guided && !follows()) fill_kept(now, request);
+  request.lead.reset();
+  if (lead_ == LeadState::sought)
+    request.lead = Lead{motion_.get(), now.reference.time_s + ahead_s_};
+  else if (mode_ == Mode::guided && !follows())
+    fill_kept(now, request);
   if (mode_ == Mode::waiting && count_ == 0 && !follows()) {
     ++number_;
     hold(now);
@@ -118,6 +147,10 @@ Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
     return News::none;
   }
   ++figures_.searches;
+  if (lead_ == LeadState::sought) {
+    take_lead(now, answer);
+    return News::none;
+  }
   if (answer.path.found() && answer.path.points.cols() <= path_.cols()) {
     ++figures_.found;
     figures_.length = answer.path.length;
@@ -135,6 +168,53 @@ Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
     if (!follows()) ++number_;
   }
   return News::no_path;
+}
+
+// One that comes too late is asked for again, from a later time on.
+void Guidance::take_lead(const Now& now, GuideAnswer& answer) {
+  const bool usable = answer.motion && answer.path.points.cols() <= path_.cols() &&
+                      answer.lead->path == now.followed && now.reference.rate > full_rate;
+  if (!usable) return end_lead(now);
+  if (now.reference.time_s > answer.lead->time_s) {
+    ahead_s_ *= 2.0;
+    if (ahead_s_ > ahead_most_s) return end_lead(now);
+    wants_ = true;
+    return;
+  }
+  ++figures_.found;
+  figures_.length = answer.path.length;
+  figures_.option = answer.path.goal;
+  margin_m_ = answer.path.margin_m;
+  next_.swap(answer.motion);
+  next_points_.swap(answer.path.points);
+  next_s_ = answer.lead->time_s;
+  lead_ = LeadState::found;
+}
+
+void Guidance::end_lead(const Now& now) {
+  lead_ = LeadState::none;
+  mode_ = Mode::waiting;
+  wants_ = true;
+  ++number_;
+  hold(now);
+}
+
+// Both motions are the same where the arm goes over from one to the other.
+Guidance::News Guidance::go_over(const Now& now) {
+  const ReferenceState& reference = now.reference;
+  if (now.followed != motion_.get() || reference.rate < full_rate ||
+      (before_ && before_.get() == now.in_force)) {
+    end_lead(now);
+    return News::none;
+  }
+  const double time_s = reference.time_s + reference.rate * now.period_s;
+  if (time_s < next_s_) return News::none;
+  lead_ = LeadState::none;
+  before_.swap(next_);
+  before_.swap(motion_);
+  beginning_ = {time_s - next_s_, reference.rate};
+  set_path(now, next_points_);
+  return News::path;
 }
 
 // The arm may have moved on since it asked.

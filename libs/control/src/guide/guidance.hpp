@@ -41,6 +41,8 @@ class Guidance {
     std::uint64_t allowance;           ///< what the goal may touch, see World::allow()
     const scene::MotionState* target;  ///< that a follow goal has; else null
     const CertifiedPath* in_force;     ///< along which a stop goes on; else null
+    const CertifiedPath* followed;     ///< by the reference; null: none
+    const ReferenceState& reference;   ///< of the last tick
     [[nodiscard]] const scene::Goal& goal() const { return (*goals)[goal_index]; }
   };
   /// To be called once per tick, before the planner. @return what has arrived
@@ -62,6 +64,8 @@ class Guidance {
   void tell(hamelin_goal& goal) const noexcept;
   /// Counts whatever is shown.
   [[nodiscard]] std::uint64_t number() const noexcept { return number_; }
+  /// Where a motion that has just become the current one begins.
+  [[nodiscard]] timing::TimedPath::Place beginning() const noexcept { return beginning_; }
   /// The motion along the path; null if there is none.
   [[nodiscard]] const CertifiedPath* motion() const noexcept {
     return mode_ == Mode::guided && !follows() ? motion_.get() : nullptr;
@@ -74,6 +78,12 @@ class Guidance {
   enum class Mode { off, waiting, guided, unguided };
   [[nodiscard]] bool follows() const noexcept { return follows_; }
   void begin(const Now& now);
+  /// Whether the arm is on its way along a motion that may go on before that to another goal.
+  [[nodiscard]] bool may_lead(const Now& now) const;
+  void take_lead(const Now& now, GuideAnswer& answer);
+  /// The arm comes to rest before it goes on.
+  void end_lead(const Now& now);
+  News go_over(const Now& now);
   void ask(const Now& now, GuideSearch& search);
   News take(const Now& now, GuideSearch& search);
   void set_path(const Now& now, const Eigen::MatrixXd& points);
@@ -98,6 +108,15 @@ class Guidance {
   Eigen::VectorXd goal_start_;  ///< where the arm was when the goal became the current one
   /// Along the path, and along the one before, which may still be in force.
   std::unique_ptr<CertifiedPath> motion_, before_;
+  /// A goal has changed in motion: the arm goes on along the path before, until another motion
+  /// that begins on it is there, and has begun.
+  enum class LeadState { none, sought, found };
+  LeadState lead_ = LeadState::none;
+  std::unique_ptr<CertifiedPath> next_;
+  Eigen::MatrixXd next_points_;
+  double next_s_ = 0.0;   ///< on the clock of the motion before
+  double ahead_s_ = 0.0;  ///< from when on the next motion is asked for
+  timing::TimedPath::Place beginning_;
   Eigen::Index count_ = 0;  ///< way-points of the path
   double margin_m_ = 0.0;   ///< that it keeps
   Eigen::Index point_ = 0;  ///< that is shown to a planner that follows none

@@ -73,8 +73,11 @@ search::Problem GuideSearch::problem() const {
 }
 
 void GuideSearch::find(GuideAnswer& out) {
-  MotionSearch::Found found =
-      search_->find(problem(), (*request_.goals)[request_.goal], request_.way_start, query_);
+  const scene::Goal& goal = (*request_.goals)[request_.goal];
+  MotionSearch::Found found = request_.lead
+                                  ? search_->find_on(*request_.lead, problem(), goal, query_)
+                                  : search_->find(problem(), goal, request_.way_start, query_);
+  out.lead = request_.lead;
   out.checks += found.checks;
   out.path = std::move(found.path);
   out.motion = std::move(found.motion);

@@ -26,6 +26,7 @@ struct GuideRequest {
   Eigen::VectorXd way_start;    ///< where the way of a goal begins that has one
   std::shared_ptr<const std::vector<scene::Goal>> goals;  ///< with the goal; null in between
   std::size_t goal = 0;                                   ///< its index
+  std::optional<Lead> lead;                               ///< on which the motion begins, at speed
   std::optional<geometry::SE3> target;                    ///< where what a follow goal follows is
   std::uint64_t search = 0;  ///< number of the search, see search::Problem
   /// A path that is kept if it is still clear: its first kept_count columns; 0: none.
@@ -42,6 +43,7 @@ struct GuideAnswer {
   /// The motion along the path; null if there is none, or none is asked for.
   std::unique_ptr<CertifiedPath> motion;
   std::string motion_cause;  ///< one line: why the path has no motion
+  std::optional<Lead> lead;  ///< on which it begins
 };
 
 /// Answers the requests of a control loop, one at a time: on a thread of its own, or where its

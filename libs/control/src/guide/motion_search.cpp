@@ -1,6 +1,7 @@
 #include "guide/motion_search.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -9,6 +10,13 @@
 #include "hamelin/search/ways.hpp"
 
 namespace hamelin::control {
+
+namespace {
+
+// In which an arm may be slow enough for another direction [s].
+constexpr std::array braking_times_s{0.1, 0.25, 0.6, 2.0};
+
+}  // namespace
 
 MotionSearch::MotionSearch(const model::Model& model, search::Settings settings,
                            std::unique_ptr<PathTiming> timing, long other_checks)
@@ -56,6 +64,49 @@ MotionSearch::Found MotionSearch::find(search::Problem problem, const scene::Goa
   return out;
 }
 
+// The arm needs some time until it is slow enough for another direction: if there is too little,
+// the time law finds no motion, and it gets more.
+MotionSearch::Found MotionSearch::find_on(const Lead& lead, search::Problem problem,
+                                          const scene::Goal& goal, GuideQuery& query) {
+  search::TipConstraints kept(model_, goal.constraints);
+  tip_speed_m_s_ = scene::speed_max_m_s(goal.constraints);
+  const double left = lead.path->motion.duration_s() - lead.time_s;
+  long checks = 0;
+  Found out;
+  for (const double braking_s : braking_times_s) {
+    out = find_after(lead, std::min(braking_s, left), problem, kept, query);
+    checks += out.checks;
+    out.checks = checks;
+    if (out.motion || !out.path.found() || braking_s >= left) break;
+  }
+  return out;
+}
+
+MotionSearch::Found MotionSearch::find_after(const Lead& lead, double braking_s,
+                                             search::Problem& problem, search::TipConstraints& kept,
+                                             GuideQuery& world) {
+  search::ConstrainedQuery constrained(world, kept);
+  search::Query& query = kept.size() > 0 ? static_cast<search::Query&>(constrained) : world;
+  const long before = query.checks() + timing_->checks();
+  Found out;
+  Eigen::VectorXd from(problem.start.size());
+  timing_->begin(problem.number, tip_speed_m_s_);
+  timing_->begin_with(lead, braking_s, from, problem.start);
+  out.path = search_.search(problem, query);
+  const long search_checks = out.path.checks;
+  if (out.path.found() && consider(out.path, from, query)) {
+    consider_others(problem, out.path, from, query);
+    out.motion = timing_->make(query);
+    if (out.motion) {
+      out.motion->standing = world.standing();
+      out.way_points = timing_->points();
+    }
+    out.cause = out.motion ? "" : timing_->cause();
+  }
+  out.checks = std::max(search_checks, query.checks() + timing_->checks() - before);
+  return out;
+}
+
 void MotionSearch::choose(search::Problem problem, search::TipConstraints& kept, GuideQuery& query,
                           Found& found) {
   scene::Goal goal = scene::joint_goal(found.path.points.rightCols<1>());
@@ -85,8 +136,8 @@ MotionSearch::Found MotionSearch::find(const search::Problem& problem, search::T
   if (!out.path.found() || !timing_ || !times) return out;
   const long before = query.checks() + timing_->checks();
   timing_->begin(problem.number, tip_speed_m_s_);
-  timing_->consider(out.path.points, search_.margins(), query);
-  if (!problem.way) consider_others(problem, out.path, query);
+  (void)consider(out.path, {}, query);
+  if (!problem.way) consider_others(problem, out.path, {}, query);
   out.motion = timing_->make(query);
   if (out.motion) {
     out.motion->standing = world.standing();
@@ -98,9 +149,22 @@ MotionSearch::Found MotionSearch::find(const search::Problem& problem, search::T
   return out;
 }
 
+bool MotionSearch::consider(const search::Path& path, const Eigen::VectorXd& from,
+                            search::Query& query) {
+  Eigen::MatrixXd points = path.points;
+  if (from.size() > 0) {
+    query.set_margins(search_.margins());
+    if (!query.motion_clear(from, path.points.col(0))) return false;
+    points.resize(from.size(), 1 + path.points.cols());
+    points << from, path.points;
+  }
+  timing_->consider(points, search_.margins(), query);
+  return true;
+}
+
 // Other random numbers may lead around the other side of an obstacle.
 void MotionSearch::consider_others(search::Problem problem, const search::Path& first,
-                                   search::Query& query) {
+                                   const Eigen::VectorXd& from, search::Query& query) {
   if (first.points.cols() == 2) return;
   const long until = query.checks() + other_checks_;
   const std::uint64_t number = problem.number;
@@ -109,7 +173,7 @@ void MotionSearch::consider_others(search::Problem problem, const search::Path& 
     search_.begin(problem, query);
     if (!search_.advance(until - query.checks())) return;
     if (search_.path().found() && search_.path().margin_m >= first.margin_m)
-      timing_->consider(search_.path().points, search_.margins(), query);
+      (void)consider(search_.path(), from, query);
   }
 }
 

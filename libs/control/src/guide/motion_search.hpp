@@ -35,6 +35,11 @@ class MotionSearch {
   /// @param way_start where the way of a goal begins that has one
   [[nodiscard]] Found find(search::Problem problem, const scene::Goal& goal,
                            const Eigen::VectorXd& way_start, GuideQuery& query);
+  /// A path whose motion begins on another one, at speed. Goals must not have a way, an approach or
+  /// a retreat.
+  /// @param problem its start does not matter
+  [[nodiscard]] Found find_on(const Lead& lead, search::Problem problem, const scene::Goal& goal,
+                              GuideQuery& query);
 
  private:
   /// @param kept by the tip @param times whether a motion is made
@@ -44,8 +49,15 @@ class MotionSearch {
   /// tip keeps to the approach.
   void choose(search::Problem problem, search::TipConstraints& kept, GuideQuery& query,
               Found& found);
+  [[nodiscard]] Found find_after(const Lead& lead, double braking_s, search::Problem& problem,
+                                 search::TipConstraints& kept, GuideQuery& query);
   [[nodiscard]] geometry::SE3 tip_at(const Eigen::VectorXd& q);
-  void consider_others(search::Problem problem, const search::Path& first, search::Query& query);
+  /// Looks how fast the path is that was found last. @param from where the arm comes from straight
+  ///        to its first point; of size zero: it begins there @return whether that is clear
+  [[nodiscard]] bool consider(const search::Path& path, const Eigen::VectorXd& from,
+                              search::Query& query);
+  void consider_others(search::Problem problem, const search::Path& first,
+                       const Eigen::VectorXd& from, search::Query& query);
 
   const model::Model& model_;
   dynamics::Workspace ws_;

@@ -19,6 +19,8 @@ constexpr double tries_max = 250.0, improve_checks = 1000.0, usual_check_s = 2e-
 constexpr long checks_per_try = 8;
 // Of a bound of the tip's speed, what a motion uses. The rest is for what keeps the arm on it.
 constexpr double tip_speed_share = 0.9;
+// How far a new path goes on straight where it leaves another one [rad or m].
+constexpr double straight_ahead = 0.1, least_ahead = 1e-3;
 // Places at which torques are evaluated, that cost as much as a check.
 constexpr long places_per_check = 8;
 
@@ -44,6 +46,22 @@ void PathTiming::begin(std::uint64_t number, double tip_speed_m_s) {
   way_points_.set_tip_speed(tip_speed_share * tip_speed_m_s);
   rng_ = Rng(seed_ + number);
   best_.reset();
+  lead_ = {};
+  lead_speed_ = 0.0;
+}
+
+void PathTiming::begin_with(const Lead& lead, double braking_s, VectorXd& from, VectorXd& towards) {
+  const timing::TimedPath& motion = lead.path->motion;
+  const timing::TimedPath::Along begin = motion.along(lead.time_s);
+  const double end = motion.curve.next_straight(motion.along(lead.time_s + braking_s).place);
+  lead_ = motion.curve.part(begin.place, end);
+  lead_speed_ = begin.speed;
+  lead_clearance_m_ = lead.path->clearance_m.minCoeff();
+  lead_self_m_ = lead.path->self_m.minCoeff();
+  VectorXd along(from.size()), unused(from.size());
+  motion.curve.at(end, from, along, unused);
+  towards =
+      from + std::min(straight_ahead, motion.curve.end() - end + least_ahead) * along.normalized();
 }
 
 void PathTiming::consider(const MatrixXd& points, const search::Margins& margins,
@@ -60,13 +78,25 @@ void PathTiming::consider(const MatrixXd& points, const search::Margins& margins
 
 std::unique_ptr<CertifiedPath> PathTiming::make(search::Query& query) {
   checks_ += checks_per_try * effort_.tries;
-  (void)way_points_.improve(*best_, *margins_, query, rng_, effort_);
+  timing::WayPoints::Effort effort = effort_;
+  effort.fixed = lead_.pieces() > 0 ? 2 : 1;
+  (void)way_points_.improve(*best_, *margins_, query, rng_, effort);
   auto out = std::make_unique<CertifiedPath>();
+  const double led = lead_.pieces() > 0 ? lead_.end() : 0.0;
   out->motion.curve = best_->curve();
-  if (!law_.solve(out->motion)) return nullptr;
+  if (led > 0.0) {
+    lead_.add(out->motion.curve);
+    std::swap(lead_, out->motion.curve);
+  }
+  if (!law_.solve(out->motion, lead_speed_)) return nullptr;
   out->limits = law_.limits();
   checks_ += law_.evaluated() / places_per_check;
   certifier_.certify(*out, *margins_, query);
+  // its own proof holds for what the arm is on already
+  for (Index k = 0; k < out->clearance_m.size() && out->motion.place[k] < led; ++k) {
+    out->clearance_m[k] = std::min(out->clearance_m[k], lead_clearance_m_);
+    out->self_m[k] = std::min(out->self_m[k], lead_self_m_);
+  }
   out->stop_acceleration = stop_acceleration_;
   return out;
 }

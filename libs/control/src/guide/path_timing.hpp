@@ -15,6 +15,12 @@
 
 namespace hamelin::control {
 
+/// A motion that goes on for a while before another one begins, at speed: docs/theory.md (19.16).
+struct Lead {
+  const CertifiedPath* path;
+  double time_s;  ///< on its clock, from which on the new motion holds
+};
+
 /// Makes timed motions of paths that a search has found, and says what is proved of them.
 class PathTiming {
  public:
@@ -26,6 +32,13 @@ class PathTiming {
   /// Begins with the paths to a goal. @param number of the search, for random numbers
   /// @param tip_speed_m_s at most; infinite: any
   void begin(std::uint64_t number, double tip_speed_m_s);
+  /// The motion begins on another one, between begin() and consider(). Where rates are bounded
+  /// there is none.
+  /// @param braking_s in which the arm is slow enough for another direction
+  /// @param from, towards receive where new paths begin, and a place straight ahead to which they
+  ///        lead first
+  void begin_with(const Lead& lead, double braking_s, Eigen::VectorXd& from,
+                  Eigen::VectorXd& towards);
   /// Takes a path, if it is the fastest so far.
   /// @param points way-points @param margins that the lines between them are proved to keep
   /// @param query proves the blends; its margins are changed
@@ -52,6 +65,8 @@ class PathTiming {
   std::uint64_t seed_;
   Rng rng_{0};
   std::optional<timing::BlendedPath> best_;
+  timing::Curve lead_;  ///< of no pieces: there is none
+  double lead_speed_ = 0.0, lead_clearance_m_ = 0.0, lead_self_m_ = 0.0;
   std::optional<search::Margins> margins_;
   double best_s_ = 0.0;
   long checks_ = 0;

@@ -325,7 +325,7 @@ void Controller::take_goals() {
   listed_ = nullptr;
   target_.stop();
   reference_.stop();
-  path_reference_->stop();
+  if (!guidance_ || path_reference_->path() != guidance_->motion()) path_reference_->stop();
   forsaken_ = nullptr;
 }
 
@@ -395,7 +395,7 @@ void Controller::update_guidance() {
   const Guidance::News news = guidance_->update(
       {time_s_, period_s_, q(), goal_list_->shared, std::min(goals_.index(), goals_.size() - 1),
        listed_number_ + 1, arm_->view.snapshot(), arm_->view.allowance(), answer_.target,
-       path_in_force()},
+       path_in_force(), path_reference_->path(), path_reference_->state()},
       *arm_->guide);
   if (const std::uint64_t number = guidance_->number(); number != guidance_number_) {
     guidance_number_ = number;
@@ -423,8 +423,12 @@ const CertifiedPath* Controller::path_in_force() const noexcept {
 }
 
 void Controller::follow(const CertifiedPath* path) {
-  if (path != path_reference_->path())
-    path != nullptr ? path_reference_->start(*path) : path_reference_->stop();
+  if (path == nullptr)
+    path_reference_->stop();
+  else if (path != path_reference_->path())
+    path_reference_->start(*path, guidance_ && path == guidance_->motion()
+                                      ? guidance_->beginning()
+                                      : timing::TimedPath::Place());
   on_path_ = false;
   if (path == nullptr) return;
   const ReferenceState& state =

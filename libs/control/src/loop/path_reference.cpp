@@ -24,12 +24,13 @@ PathReference::PathReference(Index dof) {
   state_.certified = true;
 }
 
-void PathReference::start(const CertifiedPath& path) noexcept {
+void PathReference::start(const CertifiedPath& path,
+                          const timing::TimedPath::Place& place) noexcept {
   path_ = &path;
   started_ = false;
   cursor_ = {};
-  state_.time_s = 0.0;
-  state_.rate = 1.0;
+  state_.time_s = place.time_s;
+  state_.rate = place.rate;
   rate_change_ = 0.0;
   state_.ended = false;
 }

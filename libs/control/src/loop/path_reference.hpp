@@ -13,8 +13,8 @@ class PathReference {
  public:
   explicit PathReference(Eigen::Index dof);
 
-  /// Starts at the beginning of a path, which must stay until the next start() or stop().
-  void start(const CertifiedPath& path) noexcept;
+  /// Starts on a path, which must stay until the next start() or stop().
+  void start(const CertifiedPath& path, const timing::TimedPath::Place& place) noexcept;
   void stop() noexcept { path_ = nullptr; }
   [[nodiscard]] const CertifiedPath* path() const noexcept { return path_; }
 

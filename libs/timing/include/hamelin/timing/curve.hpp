@@ -19,6 +19,13 @@ class Curve {
   /// The motion of a trajectory; its parameter is the time [s], docs/theory.md (18.14), (18.15).
   explicit Curve(const scene::JointTrajectory& trajectory);
 
+  /// Appends a curve of the same size that begins where this one ends, with the same tangent.
+  void add(const Curve& curve);
+  /// The part between two places, with its parameter from 0 on.
+  [[nodiscard]] Curve part(double from, double to) const;
+  /// The first end of a piece that does not come before a place and at which q″ is zero; the end of
+  /// the curve if there is none.
+  [[nodiscard]] double next_straight(double from) const;
   /// Appends a piece. @param coefficients dof × (degree + 1): of (σ − its beginning)^k
   void add(double length, const Eigen::MatrixXd& coefficients);
 

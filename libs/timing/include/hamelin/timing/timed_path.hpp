@@ -40,6 +40,11 @@ struct TimedPath {
   struct Cursor {
     Eigen::Index node = 0, piece = 0;  ///< the last ones that it passed
   };
+  /// σ at a time, which is clamped to the motion, and dσ/dt there.
+  struct Along {
+    double place, speed;
+  };
+  [[nodiscard]] Along along(double t) const;
   /// Position, velocity and acceleration at a time, which is clamped to the motion. No allocation
   /// if the vectors have dof numbers.
   /// @param cursor of the same or an earlier time; moved on

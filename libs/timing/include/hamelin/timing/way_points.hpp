@@ -23,8 +23,9 @@ class WayPoints {
   void set_tip_speed(double m_s) noexcept { law_.set_tip_speed(m_s); }
 
   struct Effort {
-    int tries = 300;       ///< changes that are tried
-    long checks = 100000;  ///< of the query, at most about so many
+    int tries = 300;         ///< changes that are tried
+    long checks = 100000;    ///< of the query, at most about so many
+    Eigen::Index fixed = 1;  ///< points at the beginning that stay, at least one
   };
   /// The duration of a motion along a path, without limits of torques [s].
   [[nodiscard]] double duration_s(const BlendedPath& path) { return law_.duration_s(path.curve()); }
@@ -39,7 +40,7 @@ class WayPoints {
   struct Change {
     Eigen::Index first, last;
   };
-  [[nodiscard]] Change change(const Eigen::MatrixXd& from, Rng& rng);
+  [[nodiscard]] Change change(const Eigen::MatrixXd& from, Eigen::Index fixed, Rng& rng);
   void keep_limits(Eigen::Index point);
   [[nodiscard]] bool keep_constraints(const Change& changed, search::Query& query);
   void predict(const BlendedPath& now, const Change& changed, BlendedPath& out) const;
