@@ -36,7 +36,6 @@ class AxisRule final : public TipRule {
         plan_angle_(angle_ - reserve_) {}
 
   [[nodiscard]] std::string_view name() const noexcept override { return "axis"; }
-  [[nodiscard]] std::string_view unit() const noexcept override { return "rad"; }
   [[nodiscard]] bool turns() const noexcept override { return true; }
   [[nodiscard]] Value value(const geometry::SE3& tip) const override {
     Value out = Value::Zero();

@@ -37,7 +37,6 @@ class BoxRule final : public TipRule {
   }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "box"; }
-  [[nodiscard]] std::string_view unit() const noexcept override { return "m"; }
   [[nodiscard]] Value value(const geometry::SE3& tip) const override {
     Value out = Value::Zero();
     out.head<3>() = from_world_ * (tip.p() - origin_);

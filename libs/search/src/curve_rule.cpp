@@ -26,7 +26,6 @@ class CurveRule final : public TipRule {
                                    : 2.0 * std::sin(0.5 * (1.0 - reserve_share) * tolerance.rad)) {}
 
   [[nodiscard]] std::string_view name() const noexcept override { return "way"; }
-  [[nodiscard]] std::string_view unit() const noexcept override { return "m"; }
   [[nodiscard]] Value value(const geometry::SE3& tip) const override {
     const double s = curve_.nearest(tip);
     const geometry::SE3 wanted = curve_.at(s);

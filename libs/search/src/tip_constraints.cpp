@@ -99,7 +99,7 @@ TipConstraints::Excess TipConstraints::excess(const dynamics::TipTarget& target)
 std::string TipConstraints::describe(const Excess& excess) const {
   const TipRule& rule = *rules_[excess.constraint];
   return fmt::format("constraint {} ({}) is exceeded by {:.3g} {}", numbers_[excess.constraint],
-                     rule.name(), excess.by, rule.unit());
+                     rule.name(), excess.by, scene::unit_of(rule.name()));
 }
 
 void TipConstraints::admit(const VectorXd& q) {

@@ -36,7 +36,6 @@ class TipRule {
   virtual ~TipRule() = default;
 
   [[nodiscard]] virtual std::string_view name() const noexcept = 0;
-  [[nodiscard]] virtual std::string_view unit() const noexcept = 0;
   [[nodiscard]] virtual Value value(const geometry::SE3& tip) const = 0;
   /// By how much the tolerance is exceeded; 0 or less: it is kept.
   [[nodiscard]] virtual double excess(const Value& value) const = 0;

@@ -13,7 +13,6 @@
 namespace hamelin::search {
 
 using Eigen::Index;
-using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
@@ -141,8 +140,8 @@ void WayFollower::set_step(const Eigen::Matrix<double, 6, 1>& error) {
     G_.diagonal().array() += reach_damping;
     step_.noalias() = J_.transpose() * G_.llt().solve(error);
     for (Index j = 0; j < q_.size(); ++j) {
-      const bool stays = (step_[j] < 0.0 && q_[j] <= box_.lower[j]) ||
-                         (step_[j] > 0.0 && q_[j] >= box_.upper[j]);
+      const bool stays =
+          (step_[j] < 0.0 && q_[j] <= box_.lower[j]) || (step_[j] > 0.0 && q_[j] >= box_.upper[j]);
       if (!stays) continue;
       J_.col(j).setZero();
       open = true;
