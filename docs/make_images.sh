@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 build=$(realpath "$1")
 shift
 names=("$@")
-((${#names[@]})) || names=(shelf paper_52 shelf_person shelf_seen carry follow tutorial gain_map)
+((${#names[@]})) || names=(shelf paper_52 shelf_person shelf_seen task follow tutorial gain_map)
 program=$build/bin/hamelin
 export NODE_MODULES=$build/npm/node_modules
 work=$(mktemp -d)
@@ -42,7 +42,10 @@ for name in "${names[@]}"; do
       ;;
     shelf_person) run data/scenes/shelf_person.json person.jsonl && picture shelf_person 9.7 1200x806 person.jsonl ;;
     shelf_seen) run data/scenes/shelf_seen.json seen.jsonl && picture shelf_seen 1.2 1200x806 seen.jsonl ;;
-    carry) run data/scenes/shelf_carry.json carry.jsonl && picture carry 9.5 1200x806 carry.jsonl ;;
+    task)
+      "$program" --quiet task data/tasks/table.json --log "$work/task.jsonl"
+      picture task 1.15 1200x806 task.jsonl
+      ;;
     follow) run data/scenes/follow_shelf.json follow.jsonl && picture follow 20 1200x806 follow.jsonl ;;
     tutorial)
       # The files of the tutorial, as its pages say to save them.

@@ -6,6 +6,7 @@
 namespace hamelin::app {
 
 void add_run(CLI::App& app, int& exit_code);
+void add_task(CLI::App& app, int& exit_code);
 void add_plan(CLI::App& app, int& exit_code);
 void add_optimize(CLI::App& app, int& exit_code);
 void add_integrate(CLI::App& app, int& exit_code);

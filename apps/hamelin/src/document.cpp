@@ -19,6 +19,8 @@ std::string_view to_string(Kind kind) noexcept {
       return "robot";
     case Kind::scene:
       return "scene";
+    case Kind::task:
+      return "task";
     case Kind::result:
       return "result";
     case Kind::explanation:
@@ -92,6 +94,7 @@ Kind recognise(const std::filesystem::path& file) {
   const Json schema = document.value("schema", Json(nullptr));
   if (schema == "hamelin.robot/1") return Kind::robot;
   if (schema == "hamelin.scene/1") return Kind::scene;
+  if (schema == "hamelin.task/1") return Kind::task;
   if (schema == "hamelin.result/1") return Kind::result;
   if (schema == "hamelin.explanation/1") return Kind::explanation;
   if (schema == "hamelin.path/1") return Kind::path;
@@ -110,7 +113,8 @@ Kind recognise(const std::filesystem::path& file) {
   throw Error(
       ErrorCode::invalid,
       fmt::format(
-          "{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1, "
+          "{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.task/1, "
+          "hamelin.result/1, "
           "hamelin.explanation/1, hamelin.path/1, hamelin.trajectory/1, hamelin.primitives/1, "
           "hamelin.sweep/1, hamelin.summary/1, hamelin.comparison/1, hamelin.accuracy/1, "
           "hamelin.problems/1, hamelin.benchmark/1 or hamelin.archive/1",

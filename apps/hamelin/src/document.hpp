@@ -12,6 +12,7 @@ enum class Kind {
   urdf,
   robot,
   scene,
+  task,
   result,
   explanation,
   path,

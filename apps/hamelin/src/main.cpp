@@ -24,7 +24,7 @@ struct CommandGroup {
 const std::vector<CommandGroup>& command_groups() {
   static const std::vector<CommandGroup> all{
       {"Run",
-       {add_run, add_plan, add_optimize, add_integrate, add_accuracy, add_replay, add_sweep,
+       {add_run, add_task, add_plan, add_optimize, add_integrate, add_accuracy, add_replay, add_sweep,
         add_bench, add_serve, add_plant}},
       {"Inspect", {add_report, add_explain, add_robot, add_scene, add_map, add_plugins}},
       {"Files", {add_export, add_validate, add_schema}},

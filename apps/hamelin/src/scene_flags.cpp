@@ -29,15 +29,19 @@ scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& fla
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: is a {}, expected a scene", file.string(), to_string(kind)));
   Json document = read_json(file);
+  apply_flags(flags, document, file.string());
+  return scene::scene_from_json(document, file.parent_path(), file.string());
+}
+
+void apply_flags(const SceneFlags& flags, Json& document, const std::string& where) {
   const bool implied = imply_sampled_actuation(flags, document);
   scene::apply(flags, "--planner", document);
-  scene::Scene scene = scene::scene_from_json(document, file.parent_path(), file.string());
-  if (implied && scene.actuation.type == scene::ActuationType::sampled)
+  if (implied && document["actuation"].is_object() &&
+      document["actuation"].value("type", Json()) == "sampled")
     note(
         fmt::format("{}: /actuation/type: is sampled instead of ideal, because the joints of "
                     "MuJoCo take torques",
-                    file.string()));
-  return scene;
+                    where));
 }
 
 void add_set_option(CLI::App& command, std::vector<std::string>& set, const std::string& help) {

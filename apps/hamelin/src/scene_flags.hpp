@@ -18,6 +18,10 @@ using SceneFlags = scene::Overrides;
 /// @throws Error like scene::scene_from_json, and for a file that is not a scene
 [[nodiscard]] scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& flags);
 
+/// Writes the flags into the document of a scene, before it is checked.
+/// @param where prefix of messages
+void apply_flags(const SceneFlags& flags, Json& document, const std::string& where);
+
 /// Adds --set, whose assignments scene::set_pointer() takes.
 void add_set_option(CLI::App& command, std::vector<std::string>& set, const std::string& help);
 

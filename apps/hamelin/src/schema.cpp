@@ -11,9 +11,9 @@ namespace hamelin::app {
 namespace {
 
 const std::vector<std::string> names = {
-    "robot",       "scene",    "primitives", "integrator", "run",    "result",
-    "explanation", "path",     "trajectory", "sweep",      "record", "summary",
-    "comparison",  "accuracy", "problems",   "benchmark",  "archive"};
+    "robot",   "scene",       "task",     "primitives", "integrator", "run",
+    "result",  "explanation", "path",     "trajectory", "sweep",      "record",
+    "summary", "comparison",  "accuracy", "problems",   "benchmark",  "archive"};
 
 void print_schema(const std::string& name, bool json) {
   if (!name.empty())

@@ -16,6 +16,7 @@
 #include "hamelin/scene/make.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/sweep/plan.hpp"
+#include "hamelin/task/task.hpp"
 #include "robot_commands.hpp"
 #include "robot_notes.hpp"
 #include "terminal.hpp"
@@ -83,6 +84,10 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
       return check_robot(file, {options.tip, {}, {}, options.strict});
     case Kind::scene:
       return check_scene(file, options.strict);
+    case Kind::task: {
+      const auto task = task::task_from_json(read_json(file), file.parent_path(), file.string());
+      return fmt::format("task, {} objects, {} steps", task.objects.size(), task.steps.size());
+    }
     case Kind::result:
       check_shipped_schema(read_json(file), "result", file.string());
       return "result";

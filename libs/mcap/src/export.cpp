@@ -87,10 +87,12 @@ class Run {
     if (line["text"] == "the map changes") scenery_.change_map();
     const bool attached = line.contains("attached");
     if (!attached && !line.contains("detached")) return;
-    if (attached)
+    if (attached) {
       arm_.attach(line["attached"].get<std::string>());
-    else
+      scenery_.take_up(line["attached"].get<std::string>());
+    } else {
       arm_.detach(line["detached"].get<std::string>(), vector_of(line.value("q", Json::array())));
+    }
     topics_.send(Topic::arm, now, arm_.shapes(now));
   }
 

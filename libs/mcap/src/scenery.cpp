@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <limits>
 #include <set>
+#include <utility>
 
 #include "hamelin/dynamics/dynamics.hpp"
 
@@ -82,6 +84,16 @@ void Scenery::change_map() {
   if (!has_map_ || next_event_ == scene_.events.size()) return;
   environment_ = environment_.with_change(*scene_.events[next_event_++].map);
   map_changed_ = true;
+}
+
+void Scenery::take_up(const std::string& load) {
+  for (const scene::Event& event : scene_.events)
+    for (std::size_t k = 0; k < names_.size(); ++k) {
+      scene::Obstacle obstacle = environment_.obstacles()[k];
+      if (!event.attach || event.attach->name != load || obstacle.name != event.obstacle) continue;
+      obstacle.appears_s = std::numeric_limits<double>::infinity();
+      environment_ = environment_.with_obstacle(k, std::move(obstacle));
+    }
 }
 
 std::optional<Json> Scenery::map(std::uint64_t time_ns, double time_s) {

@@ -27,6 +27,8 @@ class Scenery {
   /// Applies the map of the next event of the scene that has one.
   /// @throws Error io, parse or invalid
   void change_map();
+  /// The obstacle that an event attaches under this name, if it is one, is not shown any more.
+  void take_up(const std::string& load);
   /// The occupied space, in merged boxes.
   [[nodiscard]] std::optional<Json> map(std::uint64_t time_ns, double time_s);
   /// The obstacles that exist.

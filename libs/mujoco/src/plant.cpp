@@ -90,6 +90,13 @@ class MujocoPlant final : public simulation::Plant {
     arrive(true);
   }
 
+  void change_obstacle(std::size_t index, const scene::Obstacle& obstacle) override {
+    environment_ = environment_.with_obstacle(index, obstacle);
+    build(map_boxes_);
+    put_state();
+    arrive(true);
+  }
+
   [[nodiscard]] integration::Energy energy() override {
     return {dynamics::kinetic_energy(setup_.model, ws_, node_.q, node_.v),
             dynamics::potential_energy(setup_.model, ws_, node_.q)};

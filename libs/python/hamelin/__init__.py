@@ -38,7 +38,17 @@ from ._hamelin import (
     plugin_path,
 )
 from ._logs import Log, read_log
-from ._motions import Explanation, Motion, PathMotion, PathPlan, explain, optimize, plan, postures
+from ._motions import (
+    Explanation,
+    Motion,
+    PathMotion,
+    PathPlan,
+    explain,
+    optimize,
+    plan,
+    postures,
+    task,
+)
 from ._pages import Page, report
 from ._robots import FitResult, fit_robot, robot_info
 from ._runs import Result, Verification, full_config, integrate, load_scene, run, verify
@@ -94,5 +104,6 @@ __all__ = [
     "robot_info",
     "run",
     "sweep",
+    "task",
     "verify",
 ]

@@ -8,7 +8,7 @@ from typing import Any, Sequence
 import numpy as np
 
 from ._files import write_document
-from ._hamelin import _explain, _optimize, _plan, _postures
+from ._hamelin import Scene, _explain, _optimize, _plan, _postures, _task
 from ._progress import Bar
 from ._runs import SceneLike, as_scene, overrides_of
 from ._types import Array, Document, DocumentMapping, PathLike, Progress
@@ -208,6 +208,24 @@ def postures(
     made = as_scene(scene, overrides_of(set=values))
     found: dict[str, Any] = _postures(made, goal, count, apart, attempts)
     return found
+
+
+def task(
+    task: PathLike | Document,
+    *,
+    planner: str | None = None,
+    plant: str | None = None,
+    duration: float | None = None,
+    seed: int | None = None,
+    set: str | Sequence[str] | None = None,  # noqa: A002 (the program's name)
+) -> Scene:
+    """Chooses grasps and ways for the steps of a task, as `hamelin task`: a scene for run().
+
+    task: a file, or a document of hamelin.task/1 as a dict. The other arguments replace values of
+    its scene. Raises Error if a step cannot be done.
+    """
+    values = overrides_of(planner=planner, plant=plant, duration=duration, seed=seed, set=set)
+    return _task(task, values)
 
 
 def optimize(

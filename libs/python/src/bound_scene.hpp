@@ -34,6 +34,8 @@ using SharedScene = std::shared_ptr<BoundScene>;
 
 [[nodiscard]] SharedScene read_scene(const std::filesystem::path& file,
                                      const scene::Overrides& overrides);
+/// Values that replace those of a scene, as Python gives them. @throws Error usage
+[[nodiscard]] scene::Overrides checked_overrides(const py::dict& given);
 /// A Scene, a document as a dict, or the path of a file.
 [[nodiscard]] SharedScene scene_of(py::handle given, const scene::Overrides& overrides);
 

@@ -8,6 +8,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/optimal/scene_motion.hpp"
 #include "hamelin/simulation/explain.hpp"
+#include "hamelin/task/task.hpp"
 #include "interrupts.hpp"
 #include "module.hpp"
 
@@ -47,6 +48,25 @@ py::dict postures(const BoundScene& scene, std::size_t goal, std::size_t count, 
   return py::dict(py::arg("q") = q, py::arg("clearance_m") = clearance, py::arg("option") = options,
                   py::arg("tried") = figures.tried, py::arg("reached") = figures.reached,
                   py::arg("clear") = figures.clear, py::arg("repeated") = found.repeated);
+}
+
+SharedScene task_scene(py::handle given, const py::dict& overrides) {
+  const bool is_file = PyDict_Check(given.ptr()) == 0;
+  const std::filesystem::path file = is_file ? path_of(given) : std::filesystem::path("task");
+  Json document = is_file ? read_json(file) : to_json(given);
+  if (document.is_object() && document.contains("scene"))
+    scene::apply(checked_overrides(overrides), "planner", document["scene"]);
+  const auto folder = is_file ? file.parent_path() : std::filesystem::path(".");
+  task::TaskPlan plan;
+  InterruptCheck interrupts;
+  {
+    const py::gil_scoped_release unlocked;
+    const task::Task task = task::task_from_json(document, folder, file.string());
+    plan = task::plan_task(task, [&interrupts] { interrupts.raise(); });
+  }
+  if (!plan.found())
+    throw Error(ErrorCode::invalid, fmt::format("{}: {}", file.string(), plan.cause));
+  return std::make_shared<BoundScene>(scene::resolved_json(plan.scene), ".", file.string());
 }
 
 // The value of an option, within what `hamelin optimize` accepts.
@@ -138,6 +158,8 @@ void add_motions(py::module_& module) {
   module.def("_plan", &plan, arg("scene"), arg("motions"), "The document of `hamelin plan`.");
   module.def("_postures", &postures, arg("scene"), arg("goal"), arg("count"), arg("apart"),
              arg("attempts"), "Clear configurations at a goal, and how many were tried.");
+  module.def("_task", &task_scene, arg("task"), arg("overrides"),
+             "The scene of `hamelin task`; raises Error if a step cannot be done.");
   module.def("_optimize", &optimize, arg("scene"), arg("options"),
              "The document of `hamelin optimize`, and whether the motion is valid.");
   module.def("_explain", &explain, arg("log"), arg("motions"), arg("seed"), arg("progress"),

@@ -376,17 +376,6 @@ scene::Overrides overrides_of(const py::dict& given) {
   return o;
 }
 
-// py::cast_error is a RuntimeError; a wrong argument is a TypeError.
-scene::Overrides checked_overrides(const py::dict& given) {
-  try {
-    return overrides_of(given);
-  } catch (const py::cast_error&) {
-    throw py::type_error(
-        "Scene: expected planner, guide, integrator, plant: str; step, duration: float; seed: "
-        "a non-negative int; set: a list of str");
-  }
-}
-
 std::string repr_of_scene(const BoundScene& s) {
   return fmt::format("<hamelin.Scene '{}': robot '{}', {} goals, {}, {} obstacles, planner {}>",
                      s.name, s.scene.robot.file.filename().string(), s.scene.goals.size(),
@@ -482,6 +471,17 @@ BoundScene::BoundScene(Json given, fs::path base_dir, std::string where)
 const SharedModel& BoundScene::model() {
   if (!model_) model_ = std::make_shared<BoundModel>(control::load_model(scene));
   return model_;
+}
+
+// py::cast_error is a RuntimeError; a wrong argument is a TypeError.
+scene::Overrides checked_overrides(const py::dict& given) {
+  try {
+    return overrides_of(given);
+  } catch (const py::cast_error&) {
+    throw py::type_error(
+        "Scene: expected planner, guide, integrator, plant: str; step, duration: float; seed: "
+        "a non-negative int; set: a list of str");
+  }
 }
 
 SharedScene read_scene(const fs::path& file, const scene::Overrides& overrides) {

@@ -29,8 +29,11 @@ std::vector<Vector3d> balls_along(const Vector3d& from, const Vector3d& to, doub
 }
 
 Loads::Loads(const scene::Scene& scene, const geometry::SE3& tip) : tip_(tip) {
-  for (const auto& event : scene.events)
-    if (event.attach) known_.push_back(*event.attach);
+  for (const auto& event : scene.events) {
+    if (!event.attach) continue;
+    known_.push_back(*event.attach);
+    if (!event.obstacle.empty()) obstacles_[event.attach->name] = event.obstacle;
+  }
   if (!scene.model.payload) return;
   known_.push_back(*scene.model.payload);
   attach(scene.model.payload->name, 0.0);
@@ -51,10 +54,21 @@ Json Loads::balls_of(const std::string& name) const {
   return out;
 }
 
+void Loads::take_up(const Json& obstacle, double time_s) {
+  for (Json& load : loads_)
+    if (!obstacle.is_null() && load["obstacle"] == obstacle && load["gone"].is_null())
+      load["gone"] = time_s;
+}
+
 void Loads::attach(const std::string& name, double time_s) {
+  const auto found = obstacles_.find(name);
+  const Json obstacle = found != obstacles_.end() ? Json(found->second) : Json(nullptr);
+  take_up(obstacle, time_s);
   loads_.push_back({{"name", name},
+                    {"obstacle", obstacle},
                     {"t", time_s},
                     {"until", nullptr},
+                    {"gone", nullptr},
                     {"q_end", nullptr},
                     {"balls", balls_of(name)}});
 }

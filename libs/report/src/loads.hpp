@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -17,14 +18,17 @@ class Loads {
   /// @param q configuration of the event
   void attach(const std::string& name, double time_s);
   void detach(const std::string& name, double time_s, const Eigen::VectorXd& q);
-  /// One object for each: name, times, balls in the base frame at q = 0 that move with the tip, and
-  /// the configuration in which it was detached.
+  /// One object for each: name, times, the obstacle that it is, balls in the base frame at q = 0
+  /// that move with the tip, and the configuration in which it was detached.
   [[nodiscard]] Json take() { return std::move(loads_); }
 
  private:
   [[nodiscard]] Json balls_of(const std::string& name) const;
+  /// The obstacle of this name is not where it was left any more.
+  void take_up(const Json& obstacle, double time_s);
 
   std::vector<scene::Payload> known_;
+  std::map<std::string, std::string> obstacles_;  ///< by the name of the load
   geometry::SE3 tip_;
   Json loads_ = Json::array();
 };

@@ -276,6 +276,18 @@ Json predicted_json(const scene::Obstacle& obstacle, double duration_s, Containe
       {"quaternion_wxyz", turns ? container.centred(quaternion, quaternion_step) : Json(nullptr)}};
 }
 
+// @return whether there are any
+bool leave_out_carried(scene::Scene& scene) {
+  bool any = false;
+  for (const scene::Event& event : scene.events)
+    for (scene::Obstacle& obstacle : scene.obstacles) {
+      if (event.obstacle.empty() || obstacle.name != event.obstacle) continue;
+      obstacle.appears_s = std::numeric_limits<double>::infinity();
+      any = true;
+    }
+  return any;
+}
+
 Json obstacle_json(const scene::Obstacle& obstacle, double duration_s, Container& container) {
   Json json{{"name", obstacle.name}, {"shape", scene::to_string(obstacle.shape)}};
   if (obstacle.shape == scene::Shape::box) {
@@ -382,6 +394,8 @@ std::unique_ptr<World> make_world(const simulation::Recorded& recorded, std::str
   const double reach = world->model.reach();
   scene::Scene shown = scene;
   if (!has_map) shown.map.reset();
+  if (leave_out_carried(shown))
+    world->notes.push_back("clearances leave out obstacles that are carried");
   world->environment = scene::make_environment(shown, world->model, influence);
   world->has_clearances = (has_map || !scene.map) && world->environment.has_obstacles() &&
                           !world->model.shapes().empty();

@@ -106,6 +106,12 @@ Environment Environment::with_obstacles(std::vector<Obstacle> obstacles,
   return copy;
 }
 
+Environment Environment::with_obstacle(std::size_t index, Obstacle obstacle) const {
+  std::vector<Obstacle> obstacles = obstacles_;
+  obstacles[index] = std::move(obstacle);
+  return with_obstacles(std::move(obstacles));
+}
+
 void Environment::require_map() const {
   if (!map_spec_) throw Error(ErrorCode::invalid, "map: there is none, expected a map to change");
 }

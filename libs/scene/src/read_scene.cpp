@@ -387,6 +387,30 @@ std::vector<SensorSpec> read_sensors(const Reader& in, const Scene& scene) {
   return out;
 }
 
+// An obstacle that an arm carries must be one that rests by itself, and that it can see.
+void check_carried(const Reader& event, const Event& given, const Scene& scene) {
+  if (!given.attach) event.fail("obstacle", "is given without attach, expected both");
+  std::vector<std::string> names;
+  for (const Obstacle& obstacle : scene.obstacles) {
+    names.push_back(obstacle.name);
+    if (obstacle.attached_to == given.obstacle)
+      event.fail("obstacle", fmt::format("obstacle '{}' is attached to '{}', expected an obstacle "
+                                         "that nothing is attached to",
+                                         obstacle.name, given.obstacle));
+  }
+  const auto found = std::find(names.begin(), names.end(), given.obstacle);
+  if (found == names.end())
+    event.fail("obstacle",
+               fmt::format("there is no obstacle '{}', expected one of the scene's {}{}",
+                           given.obstacle, names.size(), did_you_mean(given.obstacle, names)));
+  const Obstacle& o = scene.obstacles[static_cast<std::size_t>(found - names.begin())];
+  if (moves(o) || o.shape == Shape::frame || !o.known || o.judge_only || o.appears_s > 0.0)
+    event.fail("obstacle",
+               fmt::format("'{}' moves, is a frame, or is not known from the start, expected a "
+                           "solid that rests and is known",
+                           given.obstacle));
+}
+
 std::vector<Event> read_events(const Reader& in, const std::filesystem::path& folder,
                                const Scene& scene) {
   std::vector<Event> out;
@@ -407,6 +431,8 @@ std::vector<Event> read_events(const Reader& in, const std::filesystem::path& fo
                              *event.goals_reached, scene.goals.size()));
     if (given.find("attach") != nullptr) event.attach = read_payload(given.child("attach"));
     event.detach = given.maybe<std::string>("detach");
+    event.obstacle = given.get<std::string>("obstacle", "");
+    if (!event.obstacle.empty()) check_carried(given, event, scene);
     event.required = given.get("required", true);
     if (given.find("map") != nullptr) event.map = read_map_change(given.child("map"), folder);
     if (event.attach && event.detach)

@@ -109,6 +109,7 @@ Json event_json(const Event& event) {
   if (event.time_s) out["time_s"] = *event.time_s;
   if (event.goals_reached) out["goals_reached"] = *event.goals_reached;
   if (event.attach) out["attach"] = payload_json(*event.attach);
+  if (!event.obstacle.empty()) out["obstacle"] = event.obstacle;
   if (event.detach) out["detach"] = *event.detach;
   if (event.map) {
     out["map"] = change_json(*event.map);

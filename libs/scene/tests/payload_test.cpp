@@ -173,5 +173,29 @@ TEST_CASE("events that cannot happen are refused with place and expectation", "[
              Contains("/events/3/detach: 'tool' is the payload of /model"));
   CHECK_THAT(refusal("/events/1/map=null"),
              Contains("/events/1/attach: is missing, expected attach, detach or map"));
+  CHECK_THAT(refusal("/events/3/obstacle=can"),
+             Contains("/events/3/obstacle: is given without attach"));
+  CHECK_THAT(refusal("/events/0/obstacle=cann"), Contains("there is no obstacle 'cann'"));
+  const auto carried = [](const Json& changes) {
+    Json document = read_json(data / "scenes" / "shelf_carry.json");
+    Json obstacle{
+        {"name", "can"}, {"type", "sphere"}, {"radius_m", 0.1}, {"position_m", {5, 0, 0}}};
+    obstacle.update(changes);
+    const Json lid{
+        {"name", "lid"}, {"type", "sphere"}, {"radius_m", 0.1}, {"position_m", {6, 0, 0}}};
+    document["obstacles"] = Json::array({obstacle, lid});
+    if (changes.contains("lid")) {
+      document["obstacles"][0].erase("lid");
+      document["obstacles"][1]["attached_to"] = "can";
+    }
+    document["events"][0]["obstacle"] = "can";
+    return test::error_of(
+        [&] { (void)scene::scene_from_json(document, data / "scenes", "scene"); });
+  };
+  CHECK(carried(Json::object()) == "no error");
+  CHECK_THAT(carried({{"known", false}}), Contains("/events/0/obstacle: 'can' moves, is a frame"));
+  CHECK_THAT(carried({{"motion", {{"type", "linear"}, {"velocity_m_s", {1, 0, 0}}}}}),
+             Contains("/events/0/obstacle: 'can' moves"));
+  CHECK_THAT(carried({{"lid", true}}), Contains("obstacle 'lid' is attached to 'can'"));
   CHECK_THAT(refusal("/map=null"), Contains("/events/0/map: there is no map"));
 }

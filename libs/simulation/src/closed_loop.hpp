@@ -1,5 +1,8 @@
 #pragma once
+#include <cstddef>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -7,6 +10,7 @@
 #include "energy_audit.hpp"
 #include "hamelin/control/controller.hpp"
 #include "hamelin/control/planner_setup.hpp"
+#include "hamelin/geometry/se3.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "judge.hpp"
 #include "recorder.hpp"
@@ -62,6 +66,17 @@ class ClosedLoop {
   /// What the controller has accepted becomes true of the arm, the map and the judge.
   /// @param accepted whether it has accepted another load
   void complete(const scene::Event& event, bool accepted);
+  /// Index of the obstacle that the next event attaches or detaches; none: what it does is none.
+  [[nodiscard]] std::optional<std::size_t> carried_obstacle() const;
+  /// Where it is, or was when it was attached.
+  [[nodiscard]] geometry::SE3 obstacle_pose(std::size_t index) const;
+  [[nodiscard]] scene::Obstacle obstacle_at(std::size_t index, const geometry::SE3& pose) const;
+  /// Pose of the tip at this node.
+  [[nodiscard]] geometry::SE3 tip() const;
+  /// Tells the controller that an obstacle is not there any more, or is there again.
+  void begin_obstacle(std::size_t index, bool is_attached);
+  /// That becomes true, or the controller is told that it does not.
+  void complete_obstacle(std::size_t index, bool is_attached, bool accepted);
   /// The arm carries what `carried_` lists from this node on.
   void take_load();
   /// Logs that something of this name is "attached" or "detached".
@@ -145,6 +160,7 @@ class ClosedLoop {
   std::size_t next_map_change_ = 0, goals_reached_ = 0, next_event_ = 0;
   model::Model bare_;                    ///< the arm without what events attach to it
   std::vector<scene::Payload> carried_;  ///< attached by events
+  std::map<std::size_t, geometry::SE3> in_tip_;  ///< poses of obstacles that were attached
   std::uint64_t expected_load_ = 0;      ///< of the event that has begun; 0: none has
   long observed_k_ = -1;                 ///< the step at which the controller last looked
   double observing_s_ = 0.0;             ///< that this took

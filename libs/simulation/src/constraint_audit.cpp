@@ -16,16 +16,23 @@ void raise(log::Result::Constraint& figure, double excess, double time_s) {
 
 }  // namespace
 
-ConstraintAudit::ConstraintAudit(const scene::Scene& scene, const model::Model& model) {
+ConstraintAudit::ConstraintAudit(const scene::Scene& scene, const model::Model& model)
+    : scene_(scene), model_(model) {
   for (const scene::Goal& goal : scene.goals) {
     Goal& out = goals_.emplace_back();
     if (goal.constraints.empty()) continue;
     out.speed_max_m_s = scene::speed_max_m_s(goal.constraints);
-    out.kept = std::make_unique<search::TipConstraints>(model, goal.constraints);
     for (const scene::TipConstraint& constraint : goal.constraints)
       out.figures.push_back({goals_.size(), out.figures.size() + 1,
                              std::string(scene::type_name(constraint)), -infinity, 0.0});
   }
+  take_load();
+}
+
+void ConstraintAudit::take_load() {
+  for (std::size_t i = 0; i < goals_.size(); ++i)
+    if (const auto& constraints = scene_.goals[i].constraints; !constraints.empty())
+      goals_[i].kept = std::make_unique<search::TipConstraints>(model_, constraints);
 }
 
 // A motion between two nodes is taken to be straight in joint space.

@@ -16,6 +16,8 @@ class ConstraintAudit {
   /// Both must outlive this.
   ConstraintAudit(const scene::Scene& scene, const model::Model& model);
 
+  /// The arm carries something else: its model has changed, in place.
+  void take_load();
   /// Motions that leave the last node lead to this goal.
   void set_goal(std::size_t goal) noexcept { goal_ = goal; }
   void observe(const Eigen::VectorXd& q, double time_s);
@@ -31,6 +33,8 @@ class ConstraintAudit {
     std::vector<log::Result::Constraint> figures;
     bool seen = false;
   };
+  const scene::Scene& scene_;
+  const model::Model& model_;
   std::vector<Goal> goals_;
   std::size_t goal_ = 0;
   Eigen::VectorXd last_;  ///< of size zero before the first node

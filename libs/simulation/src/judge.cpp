@@ -126,6 +126,7 @@ std::string Judge::advance_map() {
 void Judge::take_load() {
   own_ = control::WorldView::for_other_load(scene_, model_, *own_);
   view_ = own_.get();
+  constraints_.take_load();
 }
 
 void Judge::look_again() {

@@ -35,6 +35,9 @@ class Judge {
   /// The world has changed at this node, as the scene says by now. @return what, or nothing
   [[nodiscard]] std::string advance_map();
   void change_map(const scene::MapChangeSpec& change) { own_->change_map(change); }
+  void change_obstacle(std::size_t index, const scene::Obstacle& obstacle) {
+    own_->change_obstacle(index, obstacle);
+  }
   /// The arm carries something else: its model has changed, in place.
   void take_load();
   /// Goal `index` may touch something from this node on, or, where it is null, nothing.

@@ -2,8 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "closed_loop.hpp"
+#include "hamelin/control/preparation.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
 #include "loop/loaded_arm.hpp"
 
 namespace hamelin::simulation {
@@ -26,19 +29,22 @@ void ClosedLoop::advance_events() {
   if (expected_load_ != 0) {
     const bool refused = controller_->answer().refused_load == expected_load_;
     expected_load_ = 0;
-    const scene::Event& event = events[next_event_++];
+    const scene::Event& event = events[next_event_];
     if (refused) note_refused_load(event);
     complete(event, !refused);
+    ++next_event_;
   }
   while (!done_ && next_event_ < events.size() && is_due(events[next_event_])) {
     begin(events[next_event_]);
     if (expected_load_ != 0) return;
-    complete(events[next_event_++], false);
+    complete(events[next_event_], false);
+    ++next_event_;
   }
 }
 
 void ClosedLoop::begin(const scene::Event& event) {
   if (event.map) controller_->world().change_map(*event.map);
+  if (const auto obstacle = carried_obstacle()) begin_obstacle(*obstacle, event.attach.has_value());
   if (event.attach) {
     scene::Payload told = *event.attach;
     if (!told.shapes_known) {
@@ -51,6 +57,57 @@ void ClosedLoop::begin(const scene::Event& event) {
       event.detach && std::any_of(carried_.begin(), carried_.end(),
                                   [&](const auto& one) { return one.name == *event.detach; });
   if (carried) expected_load_ = controller_->detach(*event.detach, q_shown_);
+}
+
+std::optional<std::size_t> ClosedLoop::carried_obstacle() const {
+  const scene::Event* event = &scene_.events[next_event_];
+  if (event->detach) {
+    const std::string& name = *event->detach;
+    while (event != scene_.events.data() && !(event->attach && event->attach->name == name))
+      --event;
+  }
+  if (!event->attach || event->obstacle.empty()) return std::nullopt;
+  for (std::size_t k = 0; k < scene_.obstacles.size(); ++k)
+    if (scene_.obstacles[k].name == event->obstacle) return k;
+  return std::nullopt;
+}
+
+geometry::SE3 ClosedLoop::obstacle_pose(std::size_t index) const {
+  return judge_->view().environment().obstacles()[index].pose;
+}
+
+scene::Obstacle ClosedLoop::obstacle_at(std::size_t index, const geometry::SE3& pose) const {
+  scene::Obstacle out = scene_.obstacles[index];
+  out.pose = pose;
+  Eigen::Vector4d::Map(out.quaternion_wxyz.data()) = geometry::quaternion_wxyz(pose.R());
+  return out;
+}
+
+geometry::SE3 ClosedLoop::tip() const {
+  return dynamics::tip_pose(model_, judge_->view().poses());
+}
+
+void ClosedLoop::begin_obstacle(std::size_t index, bool is_attached) {
+  if (is_attached) {
+    in_tip_[index] = tip().inverse() * obstacle_pose(index);
+    controller_->world().remove_obstacle(scene_.obstacles[index].name);
+  } else if (in_tip_.contains(index)) {
+    controller_->world().set_obstacle(obstacle_at(index, tip() * in_tip_[index]));
+  }
+}
+
+void ClosedLoop::complete_obstacle(std::size_t index, bool is_attached, bool accepted) {
+  if (!in_tip_.contains(index)) return;  // it was not attached
+  if (!accepted && !is_attached) controller_->world().remove_obstacle(scene_.obstacles[index].name);
+  if (!accepted && is_attached)
+    controller_->world().set_obstacle(obstacle_at(index, obstacle_pose(index)));
+  if (accepted) {
+    scene::Obstacle changed = obstacle_at(index, tip() * in_tip_[index]);
+    if (is_attached) changed.appears_s = std::numeric_limits<double>::infinity();
+    judge_->change_obstacle(index, changed);
+    plant_->change_obstacle(index, changed);
+  }
+  if (accepted != is_attached) in_tip_.erase(index);
 }
 
 void ClosedLoop::note_refused_load(const scene::Event& event) {
@@ -73,6 +130,8 @@ void ClosedLoop::complete(const scene::Event& event, bool accepted) {
     if (sensors_) sensors_->change_map();
     report_event(false, "the map changes");
   }
+  if (const auto obstacle = carried_obstacle())
+    complete_obstacle(*obstacle, event.attach.has_value(), accepted);
   if (accepted && event.attach) {
     carried_.push_back(*event.attach);
     record_load(event.attach->name, "attached");

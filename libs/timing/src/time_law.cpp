@@ -76,8 +76,11 @@ void TimeLaw::add_nodes(double from, double to, Index count) {
     nodes_.push_back(from + (to - from) * static_cast<double>(k) / static_cast<double>(count));
 }
 
-// Pieces of timed curves are short already.
+// Pieces of timed curves are short already. From rest to rest there is some node in between, and
+// where it should be is known from several.
 void TimeLaw::set_nodes(const Curve& curve) {
+  constexpr Index least_of_all = 6;
+  const Index least = curve.pieces() == 1 ? least_of_all : 1;
   nodes_.assign(1, 0.0);
   VectorXd bend(curve.dof());
   for (Index k = 0; k < curve.pieces(); ++k) {
@@ -85,7 +88,7 @@ void TimeLaw::set_nodes(const Curve& curve) {
     curve.bound_bend(from, to, bend);
     const bool straight = bend.isZero(0.0);
     const auto by_length = static_cast<Index>(std::ceil((to - from) / grid_.spacing));
-    add_nodes(from, to, straight ? by_length : std::max(grid_.nodes_per_bend, by_length));
+    add_nodes(from, to, std::max(straight ? least : grid_.nodes_per_bend, by_length));
   }
   places_ = Eigen::Map<const VectorXd>(nodes_.data(), static_cast<Index>(nodes_.size()));
 }

@@ -494,6 +494,22 @@ TEST_CASE("blends leave room for each other on lines that are short", "[timing][
   CHECK(std::isfinite(law.duration_s(path.curve())));
 }
 
+TEST_CASE("a path much shorter than the spacing of nodes has the motion of two ramps",
+          "[timing][unit]") {
+  Balls rig;
+  timing::TimeLaw law(rig.arm, limits_of(3, 2.0, 8.0, 0.0));
+  for (const double length : {1e-4, 1e-3, 0.02}) {
+    MatrixXd points = MatrixXd::Zero(3, 2);
+    points(1, 1) = length;
+    const timing::BlendedPath path(points);
+    CHECK(law.duration_s(path.curve()) == Approx(2.0 * std::sqrt(length / 8.0)).epsilon(0.02));
+    timing::TimedPath motion;
+    motion.curve = path.curve();
+    REQUIRE(law.solve(motion));
+    CHECK(motion.duration_s() == Approx(2.0 * std::sqrt(length / 8.0)).epsilon(0.02));
+  }
+}
+
 TEST_CASE("way-points are moved to where the motion is faster and still clear",
           "[timing][property]") {
   Balls rig;

@@ -156,8 +156,19 @@ void WorldView::see(World::View& view) {
 }
 
 void WorldView::change_map(const scene::MapChangeSpec& change) {
-  scene::Environment& whole = own_->whole ? *own_->whole : own_->environment;
-  whole = whole.with_change(change);
+  take_world(all_of_it().with_change(change));
+}
+
+void WorldView::change_obstacle(std::size_t index, const scene::Obstacle& obstacle) {
+  take_world(all_of_it().with_obstacle(index, obstacle));
+}
+
+scene::Environment& WorldView::all_of_it() noexcept {
+  return own_->whole ? *own_->whole : own_->environment;
+}
+
+void WorldView::take_world(scene::Environment environment) {
+  all_of_it() = std::move(environment);
   if (own_->whole) return leave_out_allowed();
   own_->scratch = scene::Environment::Scratch(own_->environment, model_.shapes().size());
   current_ = false;

@@ -32,8 +32,8 @@ export class Loads {
 
   /** @param {Chain} chain poses of the arm at time t */
   update(chain, t) {
-    for (const { t: since, until, group, balls, last } of this.loads) {
-      group.visible = t >= since - 1e-9;
+    for (const { t: since, until, gone, group, balls, last } of this.loads) {
+      group.visible = t >= since - 1e-9 && !(gone !== null && t >= gone);
       if (!group.visible) continue;
       const at = until !== null && t >= until ? last : chain;
       for (const { center, radius, mesh } of balls) {

@@ -69,9 +69,9 @@ function pathOf(o, duration) {
   return Float32Array.from(ends.flatMap((t) => displacement(o.motion, t).map((d, c) => d + o.position_m[c])));
 }
 
-/** Obstacles as they are; some of them move or appear later. */
+/** Obstacles as they are; some of them move or appear later, or are carried away. */
 export class Obstacles {
-  constructor(obstacles, planarNormal) {
+  constructor(obstacles, loads, planarNormal) {
     this.group = new Group();
     this.moving = 0;
     this.items = obstacles.map((o) => {
@@ -79,7 +79,8 @@ export class Obstacles {
       const mesh = makeMesh(o, material);
       if (o.motion || o.poses) ++this.moving;
       this.group.add(mesh);
-      return { o, mesh, material };
+      const gone = Math.min(Infinity, ...loads.filter((load) => load.obstacle === o.name).map((load) => load.t));
+      return { o, mesh, material, gone };
     });
   }
 
@@ -88,8 +89,8 @@ export class Obstacles {
   }
 
   update(t) {
-    for (const { o, mesh } of this.items) {
-      mesh.visible = t >= (o.appears_s ?? 0);
+    for (const { o, mesh, gone } of this.items) {
+      mesh.visible = t >= (o.appears_s ?? 0) && t < gone;
       if (o.poses) {
         placeSampled(mesh, o, o.poses, t);
         continue;

@@ -47,7 +47,7 @@ export class RunScene {
     this.stop = new StopLine(replay.run, world.robot, reach);
     this.goals = new Goals(world);
     this.target = new Target(frames.target, reach);
-    this.obstacles = new Obstacles(world.obstacles ?? [], world.robot.planar_normal);
+    this.obstacles = new Obstacles(world.obstacles ?? [], replay.run.loads, world.robot.planar_normal);
     this.paths = new Paths(world.obstacles ?? [], replay.end);
     this.predictions = new Predictions(world.obstacles ?? []);
     this.floor = new Floor(floor.step, floor.half, floor.center, floor.normal);

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -82,6 +83,8 @@ class WorldView {
   /// Changes the map at once; only without a World. Results of the last look() still belong to the
   /// old map. @throws Error io, parse or invalid
   void change_map(const scene::MapChangeSpec& change);
+  /// The same for one obstacle.
+  void change_obstacle(std::size_t index, const scene::Obstacle& obstacle);
   /// Applies the changes of the map that are due. Results of the last look() still belong to the
   /// old map.
   /// @return one line that describes them; empty if none was due
@@ -172,6 +175,8 @@ class WorldView {
     scene::Allowance allowance;
     std::optional<scene::Environment> whole;  ///< with what may be touched, if anything
   };
+  [[nodiscard]] scene::Environment& all_of_it() noexcept;
+  void take_world(scene::Environment environment);
   void leave_out_allowed();
   WorldView(const scene::Scene& scene, const model::Model& model, double influence_m,
             std::optional<Own> own, World* world, std::size_t contacts_max);

@@ -173,6 +173,9 @@ class Environment {
   /// @throws Error invalid for an obstacle; io, parse or invalid for a change
   [[nodiscard]] Environment with_obstacles(std::vector<Obstacle> obstacles,
                                            std::span<const MapChangeSpec> changes = {}) const;
+  /// A copy in which one obstacle is another one.
+  /// @throws Error invalid for an obstacle
+  [[nodiscard]] Environment with_obstacle(std::size_t index, Obstacle obstacle) const;
   /// A copy in which voxels of the map are freed and occupied now; time_s of the change is not
   /// used. Queries may run on this environment at the same time.
   /// @throws Error io, parse or invalid, also if there is no map to change

@@ -43,6 +43,9 @@ struct Event {
   std::optional<double> time_s;              ///< not before this time; or
   std::optional<std::size_t> goals_reached;  ///< not before so many goals are reached
   std::optional<Payload> attach;             ///< fixed to the tip from then on
+  /// Name of the obstacle that `attach` is: not in the world until it is detached, and from then on
+  /// where the tip leaves it; empty: it is none.
+  std::string obstacle;
   std::optional<std::string> detach;         ///< name of what is not fixed to it any more
   std::optional<MapChangeSpec> map;          ///< its time is not used
   /// Whether a run ends if the controller refuses what is attached; else it goes on without it.
