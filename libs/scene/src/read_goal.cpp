@@ -153,6 +153,7 @@ void check_keys(const Reader& in, const std::string& type) {
                                      {"way", at_place},
                                      {"approach", pose || type == "joint"},
                                      {"retreat", at_place || any_of || type == "joint"},
+                                     {"pass", !follow},
                                      {"tracks", follow},
                                      {"motion", follow},
                                      {"stream", follow},
@@ -227,6 +228,7 @@ Goal read_goal(const Reader& in, const std::filesystem::path& folder) {
   goal.tolerance_rad = in.get("tolerance_rad", goal.tolerance_rad);
   goal.speed_max = in.get("speed_max", goal.speed_max);
   goal.tip_speed_max_m_s = in.maybe<double>("tip_speed_max_m_s");
+  goal.passes = in.get("pass", false);
   if (goal.type == GoalType::follow) read_target(in, folder, goal);
   if (goal.type == GoalType::any_of) read_options(in, goal);
   read_way(in, goal);

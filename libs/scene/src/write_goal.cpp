@@ -89,6 +89,7 @@ Json goal_json(const Goal& goal) {
              : goal.type == GoalType::any_of ? any_of_json(goal)
                                              : goal_to_reach_json(goal);
   out["may_touch"] = to_json(goal.may_touch);
+  if (goal.passes) out["pass"] = true;
   if (goal.retreat) out["retreat"] = stretch_json(goal.retreat);
   out["constraints"] = Json::array();
   for (const TipConstraint& constraint : goal.constraints)

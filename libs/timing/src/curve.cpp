@@ -145,6 +145,7 @@ double Curve::next_straight(double from) const {
   for (Index k = 1; k < pieces(); ++k) {
     const double at_knot = knot(k);
     if (at_knot < from) continue;
+    if (is_straight(k - 1) && knot(k - 1) <= from) return from;
     at(at_knot, q, dq, behind, k);
     const double h = knot(k) - knot(k - 1);
     before.setZero();
@@ -154,7 +155,13 @@ double Curve::next_straight(double from) const {
     if (before.lpNorm<Eigen::Infinity>() < zero && behind.lpNorm<Eigen::Infinity>() < zero)
       return at_knot;
   }
-  return end();
+  return is_straight(pieces() - 1) && knot(pieces() - 1) <= from ? from : end();
+}
+
+bool Curve::is_straight(Index piece) const {
+  for (int power = 2; power <= degree_; ++power)
+    if (!Eigen::Map<const VectorXd>(coefficient(piece, power), dof_).isZero(0.0)) return false;
+  return true;
 }
 
 }  // namespace hamelin::timing

@@ -22,6 +22,16 @@ void TimedPath::at(double t, VectorXd& q, VectorXd& v, VectorXd& a, Cursor& curs
   v *= w;
 }
 
+double TimedPath::time_at(double place) const {
+  double before = 0.0, behind = duration_s();
+  constexpr int halvings = 50;
+  for (int i = 0; i < halvings; ++i) {
+    const double middle = 0.5 * (before + behind);
+    (along(middle).place < place ? before : behind) = middle;
+  }
+  return behind;
+}
+
 TimedPath::Along TimedPath::along(double t) const {
   t = std::clamp(t, 0.0, duration_s());
   Index i = 0;

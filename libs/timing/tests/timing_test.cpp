@@ -329,7 +329,17 @@ TEST_CASE("the next straight place of a curve is where a blend ends", "[timing][
     curve.at(end, at.q, at.v, at.a);
     CHECK(at.a.norm() < 1e-9);
   }
-  CHECK(curve.next_straight(0.999 * curve.end()) == curve.end());
+  const double last = 0.999 * curve.end(), within = path.begin(1) - 1.001 * path.half_length(1);
+  CHECK(curve.next_straight(last) == last);
+  CHECK(curve.next_straight(within) == within);
+  CHECK(curve.next_straight(curve.end()) == curve.end());
+  timing::TimedPath motion;
+  motion.curve = curve;
+  const model::Model arm(model::make_chain({3}));
+  REQUIRE(timing::TimeLaw(arm, limits_of(3, 2.0, 8.0, 0.0)).solve(motion));
+  for (const double share : {0.0, 0.2, 0.7, 1.0})
+    CHECK(motion.along(motion.time_at(share * curve.end())).place ==
+          Approx(share * curve.end()).margin(1e-9));
 }
 
 TEST_CASE("what has no motion says why", "[timing][unit]") {

@@ -129,3 +129,49 @@ TEST_CASE("postures at a goal are clear, and differ", "[simulation][goals]") {
   CHECK_THAT(test::error_of([&] { (void)control::find_postures(scene, 1, {}); }),
              Contains("/goals/1: does not exist"));
 }
+
+TEST_CASE("goals that are passed are reached at speed, within their tolerances and all limits",
+          "[simulation][goals]") {
+  Json goals = Json::array();
+  const Json home = shelf_goal(1)["q"];
+  for (const std::vector<double>& by : {std::vector<double>{0.5, 0.2, 0.1},
+                                        {0.9, -0.1, 0.2},
+                                        {0.4, -0.3, -0.1},
+                                        {-0.3, 0.1, 0.3}}) {
+    Json q = home;
+    for (std::size_t j = 0; j < by.size(); ++j) q[j] = q[j].get<double>() + by[j];
+    goals.push_back({{"type", "joint"}, {"q", q}, {"tolerance_rad", 0.08}});
+  }
+  const auto run = [&](bool passes, double& slowest) {
+    Json given = goals;
+    if (passes)
+      for (std::size_t i = 0; i + 1 < given.size(); ++i) given[i]["pass"] = true;
+    const scene::Scene scene = shelf_with(given, 20.0);
+    // the slowest that the arm is between the first goal and the last
+    simulation::Watch watch;
+    Eigen::VectorXd before;
+    double before_s = 0.0;
+    slowest = 1e9;
+    bool began = false;
+    watch.at_node = [&](double time_s, const Eigen::VectorXd& q) {
+      const Eigen::VectorXd last = test::vector_of(given.back()["q"]),
+                            first = test::vector_of(given[0]["q"]);
+      const bool between = began && (q - last).lpNorm<Eigen::Infinity>() > 0.3;
+      began = began || (q - first).lpNorm<Eigen::Infinity>() < 0.08;
+      if (before.size() > 0 && between)
+        slowest = std::min(slowest, (q - before).lpNorm<Eigen::Infinity>() / (time_s - before_s));
+      before = q;
+      before_s = time_s;
+    };
+    return simulation::run(scene, plugin_directories, watch);
+  };
+  double resting = 0.0, passing = 0.0;
+  const log::Result stops = run(false, resting), passes = run(true, passing);
+  REQUIRE(stops.outcome == log::Outcome::reached);
+  REQUIRE(passes.outcome == log::Outcome::reached);
+  CHECK(passes.certified_share == 1.0);
+  CHECK(passes.time_s < stops.time_s - 0.1);
+  CHECK(resting < 0.05);
+  CHECK(passing > 0.5);
+  CHECK(*passes.speed_excess <= 0.0);
+}

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include "loop/goal_list.hpp"
 
@@ -22,6 +23,14 @@ constexpr double moved_on = 1.0;
 // Tolerance of what the planner is shown. Whether a goal is reached does not depend on it.
 constexpr double shown_tolerance = 0.02;
 constexpr std::size_t cause_max = 256;
+// Whether the way to a goal may begin anywhere, and in any direction.
+bool begins_anywhere(const scene::Goal& goal) {
+  const std::span<const scene::Goal> options = scene::options_of(goal);
+  return !goal.way && !goal.retreat &&
+         std::none_of(options.begin(), options.end(),
+                      [](const auto& option) { return option.approach.has_value(); });
+}
+
 // A new goal in motion: from when on another motion is asked for at first, and how long it may take
 // to be found [s]; the arm goes on along the one before.
 constexpr double ahead_first_s = 0.06, ahead_most_s = 0.5;
@@ -46,6 +55,12 @@ Guidance::News Guidance::update(const Now& now, GuideSearch& search) {
   News news = News::none;
   beginning_ = {};
   if (awaits_) news = take(now, search);
+  if (passes_ || passing_) check_pass(now);
+  if (may_pass(now)) {
+    lead_ = LeadState::sought;
+    passes_ = pass_tried_ = wants_ = true;
+    pass_goal_ = now.goal_index + 1;
+  }
   if (lead_ == LeadState::found) news = go_over(now);
   if (!follows() && lead_ == LeadState::none && !awaits_ && !wants_ && world_ != now.world)
     wants_ = true;
@@ -58,9 +73,16 @@ Guidance::News Guidance::update(const Now& now, GuideSearch& search) {
 // A goal with a path of its own needs no other, and one that follows a target has no end: paths to
 // them are searched where the planner asks.
 void Guidance::begin(const Now& now) {
+  const bool passed = has_passed(now);
   goal_number_ = now.goal_number;
+  passes_ = passing_ = pass_tried_ = false;
   follows_ = now.goal().type == scene::GoalType::follow;
   needs_path_ = scene::needs_path(now.goal());
+  if (passed) {
+    goal_start_ = now.q;
+    searches_ = 1;
+    return;
+  }
   const bool leads = may_lead(now);
   const bool guided = needs_path_ || (spec_.type != scene::GuideType::on_request && !follows() &&
                                       now.goal().path.cols() == 0);
@@ -77,19 +99,43 @@ void Guidance::begin(const Now& now) {
 }
 
 bool Guidance::may_lead(const Now& now) const {
-  const scene::Goal& goal = now.goal();
-  const std::span<const scene::Goal> options = scene::options_of(goal);
+  return follows_motion(now) && begins_anywhere(now.goal());
+}
+
+bool Guidance::follows_motion(const Now& now) const {
   return mode_ == Mode::guided && follows_paths_ && motion_ && now.followed == motion_.get() &&
          motion_->braking_ramp == 0.0 && now.reference.rate > full_rate &&
-         now.reference.time_s + ahead_first_s < motion_->motion.duration_s() && !goal.way &&
-         !goal.retreat && std::none_of(options.begin(), options.end(), [](const auto& option) {
-           return option.approach.has_value();
-         });
+         now.reference.time_s + ahead_first_s < motion_->motion.duration_s();
+}
+
+bool Guidance::may_pass(const Now& now) const {
+  if (pass_tried_ || passing_ || lead_ != LeadState::none || awaits_ || wants_ ||
+      !now.goal().passes || now.goal_index + 1 >= now.goals->size() || !follows_motion(now))
+    return false;
+  const scene::Goal& next = (*now.goals)[now.goal_index + 1];
+  return next.type != scene::GoalType::follow && next.path.cols() == 0 &&
+         next.may_touch == now.goal().may_touch && begins_anywhere(next);
+}
+
+// In another world the path to the current goal is proved again first. A goal that was not reached
+// where the arm passed it is gone to from rest.
+void Guidance::check_pass(const Now& now) {
+  if (passing_) {
+    if (now.followed == motion_.get() && now.reference.time_s > passed_by_s_) (void)request();
+    return;
+  }
+  if (now.followed != motion_.get() || (lead_ == LeadState::found && world_ != now.world))
+    end_pass();
+}
+
+void Guidance::end_pass() noexcept {
+  lead_ = LeadState::none;
+  passes_ = passing_ = false;
 }
 
 bool Guidance::request() {
   if (mode_ == Mode::waiting) return true;
-  lead_ = LeadState::none;
+  end_pass();
   if (!follows() && searches_ >= spec_.searches_max) return false;
   ++searches_;
   mode_ = Mode::waiting;
@@ -113,7 +159,8 @@ void Guidance::ask(const Now& now, GuideSearch& search) {
   request.allowance = now.allowance;
   request.q = now.q;
   request.goals = now.goals;
-  request.goal = now.goal_index;
+  request.goal = passes_ ? pass_goal_ : now.goal_index;
+  request.passes = passes_;
   request.way_start = goal_start_;
   request.target.reset();
   if (follows() && now.target != nullptr) request.target = now.target->pose;
@@ -140,10 +187,16 @@ Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
   // docs/theory.md (17.5)
   if (now.time_s < asked_s_ + check_time_s_ * static_cast<double>(answer.checks)) return News::none;
   awaits_ = false;
+  if (passes_) {
+    figures_.checks += answer.checks;
+    take_pass(now, answer);
+    return News::none;
+  }
   world_ = answer.snapshot;
   figures_.checks += answer.checks;
   if (answer.kept) {
     ++figures_.kept;
+    pass_tried_ = false;
     return News::none;
   }
   ++figures_.searches;
@@ -152,6 +205,7 @@ Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
     return News::none;
   }
   if (answer.path.found() && answer.path.points.cols() <= path_.cols()) {
+    passing_ = false;
     ++figures_.found;
     figures_.length = answer.path.length;
     figures_.option = answer.path.goal;
@@ -181,14 +235,28 @@ void Guidance::take_lead(const Now& now, GuideAnswer& answer) {
     wants_ = true;
     return;
   }
-  ++figures_.found;
-  figures_.length = answer.path.length;
-  figures_.option = answer.path.goal;
-  margin_m_ = answer.path.margin_m;
+  keep_next(answer);
+}
+
+void Guidance::keep_next(GuideAnswer& answer) {
   next_.swap(answer.motion);
   next_points_.swap(answer.path.points);
+  next_length_ = answer.path.length;
+  next_option_ = answer.path.goal;
+  next_margin_m_ = answer.path.margin_m;
   next_s_ = answer.lead->time_s;
+  next_passed_by_s_ = answer.passed_by_s;
   lead_ = LeadState::found;
+}
+
+// Without it the arm comes to rest at the goal, and goes on from there.
+void Guidance::take_pass(const Now& now, GuideAnswer& answer) {
+  const bool usable = answer.motion && answer.path.points.cols() <= path_.cols() &&
+                      answer.lead->path == now.followed && answer.snapshot == world_ &&
+                      now.reference.time_s <= answer.lead->time_s;
+  if (!usable) return end_pass();
+  ++figures_.searches;
+  keep_next(answer);
 }
 
 void Guidance::end_lead(const Now& now) {
@@ -204,16 +272,22 @@ Guidance::News Guidance::go_over(const Now& now) {
   const ReferenceState& reference = now.reference;
   if (now.followed != motion_.get() || reference.rate < full_rate ||
       (before_ && before_.get() == now.in_force)) {
-    end_lead(now);
+    passes_ ? end_pass() : end_lead(now);
     return News::none;
   }
   const double time_s = reference.time_s + reference.rate * now.period_s;
   if (time_s < next_s_) return News::none;
   lead_ = LeadState::none;
+  ++figures_.found;
+  figures_.length = next_length_;
+  figures_.option = next_option_;
+  margin_m_ = next_margin_m_;
   before_.swap(next_);
   before_.swap(motion_);
   beginning_ = {time_s - next_s_, reference.rate};
   set_path(now, next_points_);
+  passing_ = std::exchange(passes_, false);
+  passed_by_s_ = next_passed_by_s_;
   return News::path;
 }
 

@@ -76,11 +76,26 @@ class Guidance {
 
  private:
   enum class Mode { off, waiting, guided, unguided };
+  /// Whether the current goal is the one after a goal that was passed.
+  [[nodiscard]] bool has_passed(const Now& now) const noexcept {
+    return (passing_ || (passes_ && lead_ == LeadState::found)) &&
+           now.goal_number == goal_number_ + 1 && now.goal_index == pass_goal_;
+  }
   [[nodiscard]] bool follows() const noexcept { return follows_; }
   void begin(const Now& now);
   /// Whether the arm is on its way along a motion that may go on before that to another goal.
   [[nodiscard]] bool may_lead(const Now& now) const;
+  /// Whether the arm is on its motion, at full rate and not at its end.
+  [[nodiscard]] bool follows_motion(const Now& now) const;
+  /// Whether a motion can be asked for that leads past the current goal to the next one.
+  [[nodiscard]] bool may_pass(const Now& now) const;
+  /// Forgets that motion where it cannot be used any more.
+  void check_pass(const Now& now);
+  void end_pass() noexcept;
+  void take_pass(const Now& now, GuideAnswer& answer);
   void take_lead(const Now& now, GuideAnswer& answer);
+  /// The motion of an answer is the next one.
+  void keep_next(GuideAnswer& answer);
   /// The arm comes to rest before it goes on.
   void end_lead(const Now& now);
   News go_over(const Now& now);
@@ -112,8 +127,16 @@ class Guidance {
   /// that begins on it is there, and has begun.
   enum class LeadState { none, sought, found };
   LeadState lead_ = LeadState::none;
+  /// The lead is to the goal after the current one, which is passed.
+  bool passes_ = false;
+  bool passing_ = false;     ///< the motion is that one, and the current goal is not reached yet
+  bool pass_tried_ = false;  ///< on the way to the current goal
   std::unique_ptr<CertifiedPath> next_;
   Eigen::MatrixXd next_points_;
+  double passed_by_s_ = 0.0;   ///< on the clock of the motion that passes the current goal
+  std::size_t pass_goal_ = 0;  ///< index of the goal after the one that is passed
+  double next_length_ = 0.0, next_margin_m_ = 0.0, next_passed_by_s_ = 0.0;
+  std::size_t next_option_ = 0;
   double next_s_ = 0.0;   ///< on the clock of the motion before
   double ahead_s_ = 0.0;  ///< from when on the next motion is asked for
   timing::TimedPath::Place beginning_;

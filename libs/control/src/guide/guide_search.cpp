@@ -74,9 +74,15 @@ search::Problem GuideSearch::problem() const {
 
 void GuideSearch::find(GuideAnswer& out) {
   const scene::Goal& goal = (*request_.goals)[request_.goal];
-  MotionSearch::Found found = request_.lead
-                                  ? search_->find_on(*request_.lead, problem(), goal, query_)
-                                  : search_->find(problem(), goal, request_.way_start, query_);
+  const auto search = [&] {
+    if (!request_.lead) return search_->find(problem(), goal, request_.way_start, query_);
+    if (!request_.passes) return search_->find_on(*request_.lead, problem(), goal, query_);
+    const scene::Goal& passed = (*request_.goals)[request_.goal - 1];
+    return search_->find_past(*request_.lead, passed, problem(), goal, query_);
+  };
+  MotionSearch::Found found = search();
+  if (request_.passes) request_.lead->time_s = found.lead_s;
+  out.passed_by_s = found.passed_by_s;
   out.lead = request_.lead;
   out.checks += found.checks;
   out.path = std::move(found.path);

@@ -27,8 +27,9 @@ struct GuideRequest {
   std::shared_ptr<const std::vector<scene::Goal>> goals;  ///< with the goal; null in between
   std::size_t goal = 0;                                   ///< its index
   std::optional<Lead> lead;                               ///< on which the motion begins, at speed
-  std::optional<geometry::SE3> target;                    ///< where what a follow goal follows is
-  std::uint64_t search = 0;  ///< number of the search, see search::Problem
+  bool passes = false;  ///< and goes past the goal before; its time is when it may begin
+  std::optional<geometry::SE3> target;  ///< where what a follow goal follows is
+  std::uint64_t search = 0;             ///< number of the search, see search::Problem
   /// A path that is kept if it is still clear: its first kept_count columns; 0: none.
   Eigen::MatrixXd kept;
   Eigen::Index kept_count = 0;
@@ -44,6 +45,8 @@ struct GuideAnswer {
   std::unique_ptr<CertifiedPath> motion;
   std::string motion_cause;  ///< one line: why the path has no motion
   std::optional<Lead> lead;  ///< on which it begins
+  /// On its clock, until when it is within the tolerances of a goal that it passes.
+  double passed_by_s = 0.0;
 };
 
 /// Answers the requests of a control loop, one at a time: on a thread of its own, or where its

@@ -47,17 +47,32 @@ void PathTiming::begin(std::uint64_t number, double tip_speed_m_s) {
   rng_ = Rng(seed_ + number);
   best_.reset();
   lead_ = {};
+  leads_ = false;
   lead_speed_ = 0.0;
+}
+
+void PathTiming::lead_to(const Lead& lead, double place) {
+  const timing::TimedPath::Along begin = lead.path->motion.along(lead.time_s);
+  constexpr double least = 1e-9;
+  if (place - begin.place > least) lead_ = lead.path->motion.curve.part(begin.place, place);
+  leads_ = true;
+  lead_speed_ = begin.speed;
+  lead_clearance_m_ = lead.path->clearance_m.minCoeff();
+  lead_self_m_ = lead.path->self_m.minCoeff();
+}
+
+void PathTiming::begin_past(const Lead& lead, VectorXd& from) {
+  const timing::TimedPath& motion = lead.path->motion;
+  const double end = motion.curve.next_straight(motion.along(lead.time_s).place);
+  lead_to(lead, end);
+  VectorXd unused(from.size()), other(from.size());
+  motion.curve.at(end, from, unused, other);
 }
 
 void PathTiming::begin_with(const Lead& lead, double braking_s, VectorXd& from, VectorXd& towards) {
   const timing::TimedPath& motion = lead.path->motion;
-  const timing::TimedPath::Along begin = motion.along(lead.time_s);
   const double end = motion.curve.next_straight(motion.along(lead.time_s + braking_s).place);
-  lead_ = motion.curve.part(begin.place, end);
-  lead_speed_ = begin.speed;
-  lead_clearance_m_ = lead.path->clearance_m.minCoeff();
-  lead_self_m_ = lead.path->self_m.minCoeff();
+  lead_to(lead, end);
   VectorXd along(from.size()), unused(from.size());
   motion.curve.at(end, from, along, unused);
   towards =
@@ -79,7 +94,7 @@ void PathTiming::consider(const MatrixXd& points, const search::Margins& margins
 std::unique_ptr<CertifiedPath> PathTiming::make(search::Query& query) {
   checks_ += checks_per_try * effort_.tries;
   timing::WayPoints::Effort effort = effort_;
-  effort.fixed = lead_.pieces() > 0 ? 2 : 1;
+  effort.fixed = leads_ ? 2 : 1;
   (void)way_points_.improve(*best_, *margins_, query, rng_, effort);
   auto out = std::make_unique<CertifiedPath>();
   const double led = lead_.pieces() > 0 ? lead_.end() : 0.0;

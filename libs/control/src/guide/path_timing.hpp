@@ -39,11 +39,14 @@ class PathTiming {
   ///        lead first
   void begin_with(const Lead& lead, double braking_s, Eigen::VectorXd& from,
                   Eigen::VectorXd& towards);
+  /// The same where new paths begin at the end of the other motion, and round the corner there.
+  void begin_past(const Lead& lead, Eigen::VectorXd& from);
   /// Takes a path, if it is the fastest so far.
   /// @param points way-points @param margins that the lines between them are proved to keep
   /// @param query proves the blends; its margins are changed
   void consider(const Eigen::MatrixXd& points, const search::Margins& margins,
                 search::Query& query);
+  [[nodiscard]] bool has_path() const noexcept { return best_.has_value(); }
   /// Improves the fastest path and makes a motion along it.
   /// @return null if there is none; see cause()
   [[nodiscard]] std::unique_ptr<CertifiedPath> make(search::Query& query);
@@ -55,6 +58,9 @@ class PathTiming {
   [[nodiscard]] long checks() const noexcept { return checks_; }
 
  private:
+  /// The motion keeps to another one up to a place of its curve.
+  void lead_to(const Lead& lead, double place);
+
   Eigen::VectorXd stop_acceleration_;
   scene::Levers levers_;
   timing::Blending blending_;
@@ -65,7 +71,8 @@ class PathTiming {
   std::uint64_t seed_;
   Rng rng_{0};
   std::optional<timing::BlendedPath> best_;
-  timing::Curve lead_;  ///< of no pieces: there is none
+  bool leads_ = false;  ///< whether it begins on another motion
+  timing::Curve lead_;  ///< what it keeps of that; of no pieces: nothing
   double lead_speed_ = 0.0, lead_clearance_m_ = 0.0, lead_self_m_ = 0.0;
   std::optional<search::Margins> margins_;
   double best_s_ = 0.0;

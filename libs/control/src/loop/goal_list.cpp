@@ -7,6 +7,7 @@
 
 #include "hamelin/control/goal_tracker.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/numbers.hpp"
 
 namespace hamelin::control {
 
@@ -126,7 +127,7 @@ hamelin_goal to_c(const scene::Goal& given) {
   std::copy_n(wxyz.data(), 4, out.quaternion_wxyz);
   out.tolerance_m = goal.tolerance_m;
   out.tolerance_rad = goal.tolerance_rad;
-  out.speed_max = goal.speed_max;
+  out.speed_max = given.passes ? infinity : goal.speed_max;
   out.q = joint ? goal.q.data() : nullptr;
   out.path = goal.path.size() > 0 ? goal.path.data() : nullptr;
   out.path_points = static_cast<std::size_t>(goal.path.cols());

@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <limits>
 #include <span>
 
 namespace hamelin::control {
@@ -19,10 +18,11 @@ double tip_speed(const model::Model& model, const dynamics::Workspace& ws,
   return dynamics::point_velocity(model, ws, model.robot().tip.link, tip, v).norm();
 }
 
-GoalError option_error(const scene::Goal& goal, const model::Model& model,
+// @param passes whether the speed does not matter
+GoalError option_error(const scene::Goal& goal, bool passes, const model::Model& model,
                        const dynamics::Workspace& ws, const Eigen::VectorXd& q,
                        const Eigen::VectorXd& v) {
-  const bool slow = v.lpNorm<Eigen::Infinity>() < goal.speed_max;
+  const bool slow = passes || v.lpNorm<Eigen::Infinity>() < goal.speed_max;
   GoalError error;
   if (goal.type == scene::GoalType::joint) {
     error.radians = (q - goal.q).lpNorm<Eigen::Infinity>();
@@ -32,8 +32,9 @@ GoalError option_error(const scene::Goal& goal, const model::Model& model,
   const geometry::SE3 tip = dynamics::tip_pose(model, ws);
   const geometry::SE3 wanted = scene::nearest_pose(goal, tip);
   error.metres = (tip.p() - wanted.p()).norm();
-  error.reached = *error.metres < goal.tolerance_m && slow &&
-                  !(goal.tip_speed_max_m_s && !(tip_speed(model, ws, v) < *goal.tip_speed_max_m_s));
+  const bool tip_slow =
+      passes || !goal.tip_speed_max_m_s || tip_speed(model, ws, v) < *goal.tip_speed_max_m_s;
+  error.reached = *error.metres < goal.tolerance_m && slow && tip_slow;
   if (goal.type == scene::GoalType::pose) {
     error.radians = angle_between(tip.R(), wanted.R());
     error.reached = error.reached && *error.radians < goal.tolerance_rad;
@@ -55,12 +56,10 @@ GoalError goal_error(const scene::Goal& goal, const model::Model& model,
   GoalError best;
   if (goal.type == scene::GoalType::follow) return best;
   const std::span<const scene::Goal> options = scene::options_of(goal);
-  double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < options.size(); ++i) {
-    GoalError error = option_error(options[i], model, ws, q, v);
-    const double size = size_of(error, options[i]);
-    if (i > 0 && (best.reached || (!error.reached && !(size < least)))) continue;
-    least = size;
+    GoalError error = option_error(options[i], goal.passes, model, ws, q, v);
+    error.size = size_of(error, options[i]);
+    if (i > 0 && (best.reached || (!error.reached && !(error.size < best.size)))) continue;
     best = error;
     best.option = i;
   }

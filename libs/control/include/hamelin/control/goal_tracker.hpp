@@ -14,6 +14,7 @@ struct GoalError {
   std::optional<double> metres;  ///< of the tip, for position and pose goals
   /// Of the tip's rotation for pose goals; the largest of all joints for joint goals.
   std::optional<double> radians;
+  double size = 0.0;       ///< in tolerances, the larger of both; up to 1 within them
   bool reached = false;    ///< within the goal's tolerances, speeds included
   std::size_t option = 0;  ///< of several the nearest, measured by their tolerances
 };

@@ -90,6 +90,8 @@ struct Goal {
   /// Largest |v_i| at arrival; joint 0.05, else none.
   double speed_max = std::numeric_limits<double>::infinity();
   std::optional<double> tip_speed_max_m_s;  ///< position, pose: of the tip at arrival
+  /// Reached at any speed: the arm may pass it on the way to the next goal.
+  bool passes = false;
   bool position_only = false;               ///< follow: whether the orientation is free
   std::optional<Motion> motion;             ///< follow: of the target; none: it is streamed
   TargetStream stream;                      ///< follow without a motion

@@ -23,8 +23,8 @@ class Curve {
   void add(const Curve& curve);
   /// The part between two places, with its parameter from 0 on.
   [[nodiscard]] Curve part(double from, double to) const;
-  /// The first end of a piece that does not come before a place and at which q″ is zero; the end of
-  /// the curve if there is none.
+  /// A place itself if it is on a straight piece; else the first end of a piece behind it at which q″
+  /// is zero, or the end of the curve.
   [[nodiscard]] double next_straight(double from) const;
   /// Appends a piece. @param coefficients dof × (degree + 1): of (σ − its beginning)^k
   void add(double length, const Eigen::MatrixXd& coefficients);
@@ -50,6 +50,7 @@ class Curve {
  private:
   /// Raises it to the bound on one piece.
   void include_bend(Eigen::Index piece, double from, double to, Eigen::VectorXd& bend) const;
+  [[nodiscard]] bool is_straight(Eigen::Index piece) const;
   [[nodiscard]] const double* coefficient(Eigen::Index piece, int power) const {
     return coefficients_.data() + (piece * (degree_ + 1) + power) * dof_;
   }

@@ -45,6 +45,8 @@ struct TimedPath {
     double place, speed;
   };
   [[nodiscard]] Along along(double t) const;
+  /// The time at which σ is a place, which is clamped to the motion.
+  [[nodiscard]] double time_at(double place) const;
   /// Position, velocity and acceleration at a time, which is clamped to the motion. No allocation
   /// if the vectors have dof numbers.
   /// @param cursor of the same or an earlier time; moved on
