@@ -212,6 +212,16 @@ TEST_CASE("in hosts without a future of obstacles, all obstacles stand", "[plann
   CHECK(Tick(tick, 3).moving_count() == 5);
 
   CHECK_FALSE(Tick(tick, 3).disturbance());  // null
+  CHECK(Tick(tick, 3).kept().slack.size() == 0);
+  const std::array<double, 2> slack{0.1, -0.2};
+  const std::array<double, 6> gradient{1, 2, 3, 4, 5, 6};
+  tick.kept_count = 2;
+  tick.kept_slack = slack.data();
+  tick.kept_gradient = gradient.data();
+  CHECK(Tick(tick, 3).kept().slack[1] == -0.2);
+  CHECK(Tick(tick, 3).kept().gradient(0, 1) == 4.0);
+  tick.struct_size = offsetof(hamelin_tick, kept_count);
+  CHECK(Tick(tick, 3).kept().slack.size() == 0);
   const std::array<double, 3> disturbance{0.1, 0.2, 0.3};
   tick.disturbance = disturbance.data();
   tick.struct_size = offsetof(hamelin_tick, disturbance);

@@ -139,6 +139,20 @@ void FilterDrive::add_point(const NearPoint& point, const Pace& pace, double sof
   (void)filter_.add_row(point.row, bound, floor, softness);
 }
 
+// As a joint is kept from its limits. Where that cannot be, the arm moves on: obstacles count more.
+void FilterDrive::add_kept(const planning::Kept& kept, const Pace& pace) {
+  constexpr double never = -1e9;
+  for (Eigen::Index i = 0; i < kept.slack.size(); ++i) {
+    const double x = kept.slack[i];
+    scratch_ = kept.gradient.col(i);
+    if (scratch_.isZero(0.0)) continue;
+    const double bound = x > 0.0 ? -approach_speed(x, pace.joint_brake, pace.joint_rate)
+                                 : -limit_leaving_rate * x,
+                 present = scratch_.dot(w_), room = filter_.braking_room(scratch_, w_);
+    (void)filter_.add_row(scratch_, std::min(bound, present + room), never);
+  }
+}
+
 void FilterDrive::apply(planning::Command& command) {
   project(command);
   if (setup_.sampled())

@@ -32,7 +32,7 @@ class AxisRule final : public TipRule {
       : axis_(given.axis.normalized()),
         from_world_(frame_along(given.direction.normalized())),
         angle_(given.angle_rad),
-        reserve_(std::min(reserve_rad, reserve_share * angle_)),
+        reserve_(plan_reserve(given)),
         plan_angle_(angle_ - reserve_) {}
 
   [[nodiscard]] std::string_view name() const noexcept override { return "axis"; }
@@ -86,8 +86,6 @@ class AxisRule final : public TipRule {
   }
 
  private:
-  // What plans leave of the angle, at most as a share of it, for an arm that strays from its path.
-  static constexpr double reserve_rad = 0.02, reserve_share = 0.3;
   // What a start may add to what it uses, as a share of the angle.
   static constexpr double start_share = 0.1;
 
@@ -97,6 +95,11 @@ class AxisRule final : public TipRule {
 };
 
 }  // namespace
+
+double plan_reserve(const scene::AxisConstraint& axis) noexcept {
+  constexpr double most_rad = 0.02, most_share = 0.3;
+  return std::min(most_rad, most_share * axis.angle_rad);
+}
 
 std::unique_ptr<TipRule> axis_rule(const scene::AxisConstraint& axis) {
   return std::make_unique<AxisRule>(axis);

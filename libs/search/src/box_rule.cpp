@@ -15,6 +15,8 @@ namespace {
 // Of a box without an end, so far from its other side configurations are brought [m].
 constexpr double inner_m = 0.01;
 
+constexpr double reserve_m = 0.003, reserve_share = 0.15;
+
 // The part of [low, high] in which configurations are left where they are.
 std::pair<double, double> inner(double low, double high) {
   const bool has_low = std::isfinite(low), has_high = std::isfinite(high);
@@ -30,7 +32,7 @@ class BoxRule final : public TipRule {
         origin_(box.pose.p()),
         low_(box.low_m),
         high_(box.high_m) {
-    const Vector3d reserve = (reserve_share * (high_ - low_)).cwiseMin(reserve_m);
+    const Vector3d reserve = plan_reserve(box);
     reserve_ = reserve.minCoeff();
     plan_low_ = low_ + reserve;
     plan_high_ = high_ - reserve;
@@ -90,8 +92,6 @@ class BoxRule final : public TipRule {
   }
 
  private:
-  // What plans leave of a side, at most as a share of it, for an arm that strays from its path.
-  static constexpr double reserve_m = 0.003, reserve_share = 0.15;
   // What a start may add to what it uses, as a share of a side.
   static constexpr double start_share = 0.1;
 
@@ -101,6 +101,10 @@ class BoxRule final : public TipRule {
 };
 
 }  // namespace
+
+Vector3d plan_reserve(const scene::BoxConstraint& box) noexcept {
+  return (reserve_share * (box.high_m - box.low_m)).cwiseMin(reserve_m);
+}
 
 std::unique_ptr<TipRule> box_rule(const scene::BoxConstraint& box) {
   return std::make_unique<BoxRule>(box);

@@ -39,11 +39,11 @@ std::string_view to_string(Stretch stretch) {
     case Stretch::there:
       return "the way there";
     case Stretch::straight:
-      return "the straight way in";
+      return "the straight way to it";
     case Stretch::away:
       break;
   }
-  return "the straight way out";
+  return "the straight way from it";
 }
 
 /// What was planned, up to some step.
@@ -104,7 +104,6 @@ class Planner {
     out.scene.goals = std::move(done.goals);
     out.scene.events = std::move(done.events);
     out.steps = std::move(done.lines);
-    out.searches = stage_.searches();
     return out;
   }
 
@@ -230,7 +229,7 @@ class Planner {
     attach.goals_reached = done.goals.size();
     attach.attach = now.held->payload;
     attach.obstacle = object.solid.name;
-    const scene::Allowance around = stage_.around(pick.object, pose, object.stands_on);
+    const scene::Allowance around = stage_.around(pick.object, {pose}, object.stands_on);
     if (!reach(done, Stretch::away, line_to(moved(tip, pick.lift_m * Vector3d::UnitZ()), around)))
       return false;
     done.events.push_back(std::move(attach));
@@ -249,14 +248,7 @@ class Planner {
     down.in_world = true;
     down.distance_m = place.lower_m;
     const std::size_t object = done.situation.held->object;
-    // the places lie so near to each other that they stand on the same
-    scene::Allowance support;
-    for (const SE3& pose : place.poses) {
-      const scene::Allowance each = stage_.around(object, pose, place.onto);
-      support.boxes_m.insert(support.boxes_m.end(), each.boxes_m.begin(), each.boxes_m.end());
-      support.obstacles = each.obstacles;
-    }
-    const auto landing = land(done, tips, down, support);
+    const auto landing = land(done, tips, down, stage_.around(object, place.poses, place.onto));
     return landing && put_down(done, place, *landing, tips[landing->option]);
   }
 
@@ -265,7 +257,7 @@ class Planner {
     const Held held = *now.held;
     const Object& object = task_.objects[held.object];
     const scene::Allowance around =
-        stage_.around(held.object, place.poses[landing.option], place.onto);
+        stage_.around(held.object, {place.poses[landing.option]}, place.onto);
     std::vector<scene::TipConstraint> kept;
     if (place.tilt_rad)
       kept.emplace_back(scene::AxisConstraint{held.grasp.R().transpose() * Vector3d::UnitZ(),

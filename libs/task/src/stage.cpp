@@ -97,7 +97,6 @@ void Stage::arrange(const Situation& situation) {
 
 std::optional<Stage::Way> Stage::search(const Situation& from, const scene::Goal& goal, int round) {
   arrange(from);
-  ++searches_;
   scene::Scene scene = task_.scene;
   scene.start_q = from.q;
   scene.start_v.resize(0);
@@ -115,18 +114,23 @@ std::optional<Stage::Way> Stage::search(const Situation& from, const scene::Goal
   return Way{found.path.points, found.path.goal};
 }
 
-scene::Allowance Stage::around(std::size_t object, const SE3& pose,
+scene::Allowance Stage::around(std::size_t object, const std::vector<SE3>& poses,
                                const scene::Allowance& support) const {
   const scene::Obstacle& solid = task_.objects[object].solid;
   scene::Allowance out = support;
   out.obstacles.push_back(solid.name);
   if (!task_.scene.map) return out;
-  const Vector3d half = half_extent(solid, pose.R());
   const double near_m =
       cover_m + touched_voxels * world_.latest()->environment.summary().resolution_m;
-  scene::Box box{pose.p() - half - Vector3d::Constant(near_m),
-                 pose.p() + half + Vector3d::Constant(near_m)};
-  box.hi.z() = pose.p().z() - half.z() + near_m;
+  scene::Box box;
+  for (const SE3& pose : poses) {
+    const Vector3d half = half_extent(solid, pose.R());
+    const Vector3d low = pose.p() - half - Vector3d::Constant(near_m);
+    Vector3d high = pose.p() + half + Vector3d::Constant(near_m);
+    high.z() = pose.p().z() - half.z() + near_m;
+    const bool first = &pose == &poses.front();
+    box = {first ? low : low.cwiseMin(box.lo), first ? high : high.cwiseMax(box.hi)};
+  }
   out.boxes_m.push_back(box_in(task_.scene.map->pose, box));
   return out;
 }

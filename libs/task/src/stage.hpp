@@ -45,7 +45,6 @@ class Stage {
                                           int round);
   /// One line: why the last search found nothing.
   [[nodiscard]] const std::string& cause() const noexcept { return cause_; }
-  [[nodiscard]] long searches() const noexcept { return searches_; }
 
   /// The configuration of all zeros.
   [[nodiscard]] Eigen::VectorXd rest() const { return Eigen::VectorXd::Zero(bare_.dof()); }
@@ -53,9 +52,9 @@ class Stage {
   [[nodiscard]] geometry::SE3 tip(const Eigen::VectorXd& q);
   /// The change of the map that takes out of it the objects that it has, too.
   [[nodiscard]] const std::optional<scene::MapChangeSpec>& freed() const noexcept { return freed_; }
-  /// What an object that stands at a pose may touch while it is lifted or lowered: itself, what it
-  /// stands on, and the voxels below it.
-  [[nodiscard]] scene::Allowance around(std::size_t object, const geometry::SE3& pose,
+  /// What an object that stands at one of some poses at the same place may touch while it is lifted
+  /// or lowered: itself, what it stands on, and the voxels below it.
+  [[nodiscard]] scene::Allowance around(std::size_t object, const std::vector<geometry::SE3>& poses,
                                         const scene::Allowance& support) const;
 
  private:
@@ -72,7 +71,6 @@ class Stage {
   std::optional<scene::MapChangeSpec> freed_;
   std::vector<bool> present_;  ///< per object: whether it is in the world
   std::string cause_;
-  long searches_ = 0;
 };
 
 }  // namespace hamelin::task

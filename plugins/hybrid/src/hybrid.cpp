@@ -48,9 +48,9 @@ double track_rate_within(double horizon_s) {
 
 class Hybrid final : public planning::Planner {
  public:
-  static constexpr std::uint32_t properties = HAMELIN_FOLLOWS_TARGETS | HAMELIN_FOLLOWS_PATHS |
-                                              HAMELIN_FOLLOWS_TRAJECTORIES | HAMELIN_ASKS_FOR_PATHS |
-                                              HAMELIN_TRUSTS_CERTIFIED_PATHS;
+  static constexpr std::uint32_t properties =
+      HAMELIN_FOLLOWS_TARGETS | HAMELIN_FOLLOWS_PATHS | HAMELIN_FOLLOWS_TRAJECTORIES |
+      HAMELIN_ASKS_FOR_PATHS | HAMELIN_TRUSTS_CERTIFIED_PATHS;
 
   Hybrid(const planning::Host& host, const planning::Setup& setup, const Json& params)
       : host_(host),
@@ -161,7 +161,7 @@ class Hybrid final : public planning::Planner {
     if (evader_.evades()) gain = evasion_gain, acceleration = evasion_acceleration;
     // A reference accelerates as the motors can, so the velocity that counts is the present one.
     drive_.accelerate(u_, tracks_ ? drive_.v() : drive_.coasting_velocity(), gain, acceleration);
-    drive(command);
+    drive(tick, command);
     if (joint_damping_ > 0.0) command.damping().setConstant(joint_damping_);
     if (follows())
       check_target(tick.time_s(), command);
@@ -329,11 +329,18 @@ class Hybrid final : public planning::Planner {
     return {acceleration, track_brake, rate, acceleration, rate};
   }
 
-  void drive(planning::Command& command) {
+  // A certified path keeps what the tip is to keep.
+  [[nodiscard]] bool keeps_to_path(const planning::Tick& tick) const {
+    constexpr double on_path = 0.005;
+    return certified_ && (tick.reference()->q - drive_.q()).lpNorm<Eigen::Infinity>() < on_path;
+  }
+
+  void drive(const planning::Tick& tick, planning::Command& command) {
     drive_.begin_filter(pace(), [this](const NearPoint& point) {
       if (!evader_.moves(point.obstacle)) return certified_ ? -1.0 : 0.0;
       return evader_.has_rows() ? MoverRows::softness : -1.0;
     });
+    if (!keeps_to_path(tick)) drive_.add_kept(tick.kept(), pace());
     if (evader_.active() && evader_.has_rows())
       evader_.add_rows(arm(), drive_.coasting_velocity(), drive_.filter());
     drive_.apply(command);

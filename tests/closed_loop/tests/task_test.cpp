@@ -50,7 +50,7 @@ TEST_CASE("tasks are done without touching but what steps allow", "[simulation][
 }
 
 TEST_CASE("what is put down is an obstacle again, where it was left", "[simulation][task]") {
-  // the last ways out must not touch what they leave any more
+  // the last ways must not touch any more what they leave
   scene::Scene scene = planned("table.json", {"/objects/0/grasps/0/position_m/0=-0.04",
                                               "/objects/0/grasps/1/position_m/2=0.07"});
   CHECK(simulation::run(scene, plugin_directories, {}).outcome == log::Outcome::reached);

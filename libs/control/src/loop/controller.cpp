@@ -194,7 +194,7 @@ void Controller::ask_planner() {
   if (guidance_) update_guidance();
   update_path();
   see();
-  goal_ = {goal_for_planner(), goal_.number, index};
+  goal_ = {goal_for_planner(), goal_.number, index, &goals_.goal().constraints};
   reset_ = false;
   const double since_s = options_.clock_s != nullptr ? options_.clock_s() : 0.0;
   if (!arm_->planner.tick(k_, time_s_, q(), v(), goal_, arm_->drive->torques(), guidance_.get()))

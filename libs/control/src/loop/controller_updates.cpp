@@ -320,7 +320,7 @@ void Controller::take_goals() {
   if (&newest == goal_list_) return;
   goal_list_ = &newest;
   goals_.set_goals(newest.goals);
-  goal_ = {nullptr, goal_.number + 1, 0};
+  goal_ = {nullptr, goal_.number + 1, 0, nullptr};
   ++listed_number_;
   listed_ = nullptr;
   target_.stop();

@@ -88,6 +88,7 @@ PlannerHost::PlannerHost(const planning::Plugin& plugin, planning::SetupData set
       query_self_contacts_(view.self_contacts_max()),
       contacts_(view.contacts_max()),
       self_contacts_(view.self_contacts_max()),
+      kept_(nominal.dof()),
       time_s_(now_s),
       world_number_(view.snapshot()),
       planner_(plugin.create(std::move(setup), *this, params)),
@@ -134,6 +135,11 @@ bool PlannerHost::tick(long k, double time_s, const Eigen::VectorXd& q, const Ei
   tick.disturbance = torques.disturbance != nullptr ? torques.disturbance->data() : nullptr;
   tick.moving_count = list_obstacles(view_.environment(), view_.obstacle_ids(), time_s,
                                      scene::Among::moving, {nullptr, 0, 0});
+  kept_.clear();
+  if (goal.constraints != nullptr) kept_.update(nominal_, view_.poses(), *goal.constraints);
+  tick.kept_count = static_cast<std::size_t>(kept_.size());
+  tick.kept_slack = kept_.slack();
+  tick.kept_gradient = kept_.gradient();
   guidance_ = guidance;
   const bool answered = planner_.tick(tick, command_);
   guidance_ = nullptr;

@@ -13,6 +13,7 @@
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 #include "loop/drive.hpp"
+#include "loop/kept_rows.hpp"
 
 namespace hamelin::control {
 
@@ -90,6 +91,7 @@ class PlannerHost final : private planning::HostServices {
   std::vector<scene::SelfContact> query_self_contacts_;
   std::vector<hamelin_contact> contacts_;
   std::vector<hamelin_self_contact> self_contacts_;
+  KeptRows kept_;
   std::atomic<double> time_s_;    ///< of the last tick
   Guidance* guidance_ = nullptr;  ///< during a tick
   Drawing drawing_;

@@ -146,6 +146,7 @@ struct PlannerGoal {
   const hamelin_goal* goal;
   std::uint64_t number;
   std::size_t index;
+  const std::vector<scene::TipConstraint>* constraints;  ///< kept on the way to it; null: none
 };
 
 }  // namespace hamelin::control

@@ -189,6 +189,13 @@ struct Reference {
   bool certified;  ///< whether it is proved to be clear, and the shield can stop along it
 };
 
+/// What the tip keeps, to first order: what is left of each tolerance, but for a reserve [rad or m],
+/// negative beyond that, and the derivatives by q, one column each.
+struct Kept {
+  ConstVectorMap slack;
+  Eigen::Map<const Eigen::MatrixXd> gradient;
+};
+
 /// The input of one tick.
 class Tick {
  public:
@@ -248,6 +255,13 @@ class Tick {
     if (!HAMELIN_HAS_FIELD(raw_, hamelin_tick, disturbance) || raw_->disturbance == nullptr)
       return std::nullopt;
     return ConstVectorMap(raw_->disturbance, dof_);
+  }
+  /// What the tip keeps on the way to the goal; of no rows where nothing is kept.
+  [[nodiscard]] Kept kept() const {
+    const bool any = HAMELIN_HAS_FIELD(raw_, hamelin_tick, kept_gradient) && raw_->kept_count > 0;
+    const auto count = any ? static_cast<Eigen::Index>(raw_->kept_count) : 0;
+    return {{any ? raw_->kept_slack : nullptr, count},
+            {any ? raw_->kept_gradient : nullptr, dof_, count}};
   }
   [[nodiscard]] const hamelin_tick& raw() const { return *raw_; }
 

@@ -251,6 +251,11 @@ typedef struct hamelin_tick {
    * as the controller estimates them [rad/s^2 or m/s^2]: dof numbers; null where no torques are
    * sent. They are those of the arm, whatever a shield did with the planner's torques. */
   const double* disturbance;
+  /* What the tip keeps on the way to the goal, to first order: what is left of each tolerance, but
+   * for a reserve [rad or m], negative beyond that, and its derivative by q, dof numbers each. A path
+   * to the goal keeps them; a planner that leaves it should. */
+  size_t kept_count;
+  const double *kept_slack, *kept_gradient;
 } hamelin_tick;
 
 /* DETECTS_STALLS: running, and the planner detects its stalls itself: the scene's stall rule is

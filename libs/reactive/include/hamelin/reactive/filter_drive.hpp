@@ -66,6 +66,8 @@ class FilterDrive {
     for (const auto& point : obstacles_.points())
       if (const double soft = softness(point); soft >= 0.0) add_point(point, pace, soft);
   }
+  /// Adds rows of what the tip keeps, after begin_filter(): docs/theory.md (21.5).
+  void add_kept(const planning::Kept& kept, const Pace& pace);
   [[nodiscard]] SafetyFilter& filter() noexcept { return filter_; }
   /// Projects the velocity, and commands what leads to it.
   void apply(planning::Command& command);

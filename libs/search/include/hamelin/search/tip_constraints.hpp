@@ -15,6 +15,10 @@
 
 namespace hamelin::search {
 
+/// What plans leave of an angle [rad], and of each side of a box [m], for an arm that strays.
+[[nodiscard]] double plan_reserve(const scene::AxisConstraint& axis) noexcept;
+[[nodiscard]] Eigen::Vector3d plan_reserve(const scene::BoxConstraint& box) noexcept;
+
 class TipRule;
 
 /// What the tip keeps on a path, docs/theory.md, chapter 21: measures it, proves it on straight

@@ -77,7 +77,6 @@ struct TaskPlan {
   scene::Scene scene;              ///< for a run
   std::vector<std::string> steps;  ///< one line each: what is taken for it
   std::string cause;               ///< one line: why a step cannot be done; empty: all can
-  long searches = 0;
   [[nodiscard]] bool found() const noexcept { return cause.empty(); }
 };
 
