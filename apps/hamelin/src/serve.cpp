@@ -187,7 +187,7 @@ void add_serve(CLI::App& app, int& exit_code) {
 
 void add_plant(CLI::App& app, int& exit_code) {
   auto* command = add_command(
-      app, "plant", "Simulate the arm of a scene as a client of `hamelin serve`, with faults",
+      app, "plant", "Simulate the arm of a scene for `hamelin serve`, with faults",
       "hamelin plant data/scenes/shelf.json --socket /run/user/1000/arm --plant mujoco\n"
       "hamelin plant data/scenes/shelf.json --socket arm --real-time --lost 0.01 --late 0.01");
   const auto options = std::make_shared<PlantOptions>();

@@ -70,8 +70,8 @@ int task(const TaskOptions& options) {
 void add_task(CLI::App& app, int& exit_code) {
   auto* command =
       add_command(app, "task",
-                  "Pick objects up and put them down: choose grasps and ways for the steps of a "
-                  "task, and run them. The exit code is 1 if a step cannot be done",
+                  "Pick objects up and put them down, by grasps and ways that it finds. The exit "
+                  "code is 1 if a step cannot be done",
                   "hamelin task data/tasks/table.json --log table.jsonl.zst\n"
                   "hamelin task data/tasks/shelf.json --plant mujoco\n"
                   "hamelin task data/tasks/shelf.json --plan-only -o scene.json");

@@ -5,6 +5,8 @@
 #include "../loop.hpp"
 #include "guide/guidance.hpp"
 #include "guide/guide_search.hpp"
+#include "hamelin/control/plan_paths.hpp"
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/search/search.hpp"
 #include "hamelin/test/allocations.hpp"
 
@@ -202,6 +204,64 @@ TEST_CASE("another goal in motion is gone to at speed, without a jump of the acc
   CHECK(loop.controller.guide_figures()->waited_s < 0.05);
   constexpr double acceleration = 40.0;  // that of motions by default
   CHECK(largest_change < 1.05 * 0.001 * acceleration);
+  if (test::counts_allocations()) CHECK(allocations == 0);
+}
+
+TEST_CASE("a goal that is passed does not stop the arm, and other goals in between are taken",
+          "[control][guide][allocation]") {
+  scene::Scene scene = guided_scene();
+  const scene::Goal last = scene.goals.front();
+  const Eigen::MatrixXd path = control::plan_paths(scene).goals.front().path.points;
+  REQUIRE(path.cols() > 2);
+  scene::Goal passed = scene::joint_goal(path.col(path.cols() / 2));
+  passed.passes = true;
+  scene.goals = {passed, last};
+  control::Controller::Options options;
+  options.guide_thread = false;
+  Loop loop(scene, options, no_escape);
+  long allocations = 0;
+  double slowest = infinity;
+  const auto advance = [&](bool searches) {
+    const control::Answer* answer = nullptr;
+    const long made = test::allocations_in([&] { answer = &loop.tick(); });
+    if (loop.state.k > 0) allocations += made;
+    const control::ControlState state = answer->state;
+    loop.step(answer->torque);
+    const double away = (loop.state.q - passed.q).lpNorm<Eigen::Infinity>();
+    if (away < 0.2 && loop.state.k > 50) slowest = std::min(slowest, loop.v.norm());
+    if (searches) loop.controller.run_guide();
+    return state;
+  };
+  SECTION("to the end") {
+    control::ControlState state = control::ControlState::running;
+    while (state == control::ControlState::running && loop.state.k < 6000) state = advance(true);
+    CHECK(state == control::ControlState::reached);
+    CHECK(slowest > 0.3);
+    CHECK(loop.controller.guide_figures()->waited_s < 0.1);
+  }
+  SECTION("other goals before the guide has answered") {
+    while (loop.controller.guide_figures()->found == 0 && loop.state.k < 2000) (void)advance(true);
+    for (int k = 0; k < 30; ++k) (void)advance(false);
+    scene::Goal other = last;
+    other.q[0] += 0.2;
+    loop.controller.set_goal(other);
+    control::ControlState state = control::ControlState::running;
+    while (state == control::ControlState::running && loop.state.k < 9000) state = advance(true);
+    CHECK(state == control::ControlState::reached);
+    CHECK((loop.state.q - other.q).lpNorm<Eigen::Infinity>() < other.tolerance_rad);
+  }
+  SECTION("another world before the guide has answered") {
+    while (loop.controller.guide_figures()->found == 0 && loop.state.k < 2000) (void)advance(true);
+    scene::Obstacle far;
+    far.name = "far";
+    far.radius_m = 0.05;
+    far.pose = {Eigen::Matrix3d::Identity(), {0.0, 0.0, 3.0}};
+    for (int k = 0; k < 30; ++k) (void)advance(false);
+    loop.controller.world().set_obstacle(far);
+    control::ControlState state = control::ControlState::running;
+    while (state == control::ControlState::running && loop.state.k < 9000) state = advance(true);
+    CHECK(state == control::ControlState::reached);
+  }
   if (test::counts_allocations()) CHECK(allocations == 0);
 }
 

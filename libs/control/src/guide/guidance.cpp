@@ -128,7 +128,9 @@ void Guidance::check_pass(const Now& now) {
     end_pass();
 }
 
+// An answer that is on its way would lead to another goal than the current one.
 void Guidance::end_pass() noexcept {
+  if (passes_) awaits_ = false;
   lead_ = LeadState::none;
   passes_ = passing_ = false;
 }

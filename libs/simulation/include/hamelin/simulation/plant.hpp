@@ -55,7 +55,7 @@ class Plant {
   virtual void take_load() = 0;
   /// From this node on the map is another one. @throws Error as scene::Environment::with_change
   virtual void change_map(const scene::MapChangeSpec&) {}
-  /// From this node on an obstacle of the scene is another one. @param index of it
+  /// From this node on an obstacle of the scene, by its index, is another one.
   virtual void change_obstacle(std::size_t /*index*/, const scene::Obstacle&) {}
   /// What contacts() does not count from now on.
   virtual void allow(const scene::Allowance&) {}
