@@ -212,8 +212,9 @@ TEST_CASE("a goal that is passed does not stop the arm, and other goals in betwe
   scene::Scene scene = guided_scene();
   const scene::Goal last = scene.goals.front();
   const Eigen::MatrixXd path = control::plan_paths(scene).goals.front().path.points;
-  REQUIRE(path.cols() > 2);
-  scene::Goal passed = scene::joint_goal(path.col(path.cols() / 2));
+  VectorXd between = 0.5 * (path.col(0) + path.rightCols<1>());
+  between[0] += 0.15;
+  scene::Goal passed = scene::joint_goal(between);
   passed.passes = true;
   scene.goals = {passed, last};
   control::Controller::Options options;
