@@ -24,6 +24,16 @@ constexpr std::array corners{12.0, 6.0, 3.0, 1.0};
 // Spacing at which motions are compared with a goal [s].
 constexpr double compare_s = 0.002;
 
+// The motion along the fastest of the paths that were considered.
+void make_motion(PathTiming& timing, search::Query& query, const GuideQuery& world,
+                 MotionSearch::Found& out) {
+  out.motion = timing.make(query);
+  out.cause = out.motion ? "" : timing.cause();
+  if (!out.motion) return;
+  out.motion->standing = world.standing();
+  out.way_points = timing.points();
+}
+
 }  // namespace
 
 MotionSearch::MotionSearch(const model::Model& model, search::Settings settings,
@@ -154,16 +164,12 @@ MotionSearch::Found MotionSearch::find_past(const Lead& lead, const scene::Goal&
     timing_->begin_past(begin, from);
     for (const Way& way : all) (void)consider(way.points, way.margins, from, query);
     if (!timing_->has_path()) continue;
-    out.motion = timing_->make(query);
+    make_motion(*timing_, query, world, out);
     const auto leaving = out.motion ? leaving_s(*out.motion, passed) : std::nullopt;
     out.lead_s = begin.time_s;
     out.passed_by_s = leaving.value_or(0.0);
     if (leaving) break;
     out.motion.reset();
-  }
-  if (out.motion) {
-    out.motion->standing = world.standing();
-    out.way_points = timing_->points();
   }
   out.checks = std::max(out.path.checks, query.checks() + timing_->checks() - checks);
   return out;
@@ -183,12 +189,7 @@ MotionSearch::Found MotionSearch::find_after(const Lead& lead, double braking_s,
   const long search_checks = out.path.checks;
   if (out.path.found() && consider(out.path.points, search_.margins(), from, query)) {
     consider_others(problem, out.path, from, query);
-    out.motion = timing_->make(query);
-    if (out.motion) {
-      out.motion->standing = world.standing();
-      out.way_points = timing_->points();
-    }
-    out.cause = out.motion ? "" : timing_->cause();
+    make_motion(*timing_, query, world, out);
   }
   out.checks = std::max(search_checks, query.checks() + timing_->checks() - before);
   return out;
@@ -225,13 +226,7 @@ MotionSearch::Found MotionSearch::find(const search::Problem& problem, search::T
   timing_->begin(problem.number, tip_speed_m_s_);
   (void)consider(out.path.points, search_.margins(), {}, query);
   if (!problem.way) consider_others(problem, out.path, {}, query);
-  out.motion = timing_->make(query);
-  if (out.motion) {
-    out.motion->standing = world.standing();
-    out.way_points = timing_->points();
-  } else {
-    out.cause = timing_->cause();
-  }
+  make_motion(*timing_, query, world, out);
   out.checks += query.checks() + timing_->checks() - before;
   return out;
 }
