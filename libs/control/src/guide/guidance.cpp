@@ -241,13 +241,13 @@ void Guidance::take_lead(const Now& now, GuideAnswer& answer) {
 }
 
 void Guidance::keep_next(GuideAnswer& answer) {
-  next_.swap(answer.motion);
-  next_points_.swap(answer.path.points);
-  next_length_ = answer.path.length;
-  next_option_ = answer.path.goal;
-  next_margin_m_ = answer.path.margin_m;
-  next_s_ = answer.lead->time_s;
-  next_passed_by_s_ = answer.passed_by_s;
+  next_.motion.swap(answer.motion);
+  next_.points.swap(answer.path.points);
+  next_.length = answer.path.length;
+  next_.option = answer.path.goal;
+  next_.margin_m = answer.path.margin_m;
+  next_.begin_s = answer.lead->time_s;
+  next_.passed_by_s = answer.passed_by_s;
   lead_ = LeadState::found;
 }
 
@@ -278,18 +278,18 @@ Guidance::News Guidance::go_over(const Now& now) {
     return News::none;
   }
   const double time_s = reference.time_s + reference.rate * now.period_s;
-  if (time_s < next_s_) return News::none;
+  if (time_s < next_.begin_s) return News::none;
   lead_ = LeadState::none;
   ++figures_.found;
-  figures_.length = next_length_;
-  figures_.option = next_option_;
-  margin_m_ = next_margin_m_;
-  before_.swap(next_);
+  figures_.length = next_.length;
+  figures_.option = next_.option;
+  margin_m_ = next_.margin_m;
+  before_.swap(next_.motion);
   before_.swap(motion_);
-  beginning_ = {time_s - next_s_, reference.rate};
-  set_path(now, next_points_);
+  beginning_ = {time_s - next_.begin_s, reference.rate};
+  set_path(now, next_.points);
   passing_ = std::exchange(passes_, false);
-  passed_by_s_ = next_passed_by_s_;
+  passed_by_s_ = next_.passed_by_s;
   return News::path;
 }
 

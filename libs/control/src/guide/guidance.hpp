@@ -131,14 +131,19 @@ class Guidance {
   bool passes_ = false;
   bool passing_ = false;     ///< the motion is that one, and the current goal is not reached yet
   bool pass_tried_ = false;  ///< on the way to the current goal
-  std::unique_ptr<CertifiedPath> next_;
-  Eigen::MatrixXd next_points_;
+  /// What was found for a lead.
+  struct Next {
+    std::unique_ptr<CertifiedPath> motion;
+    Eigen::MatrixXd points;
+    double length = 0.0, margin_m = 0.0;
+    std::size_t option = 0;
+    double begin_s = 0.0;      ///< on the clock of the motion before
+    double passed_by_s = 0.0;  ///< on its own clock, if it passes a goal
+  };
+  Next next_;
   double passed_by_s_ = 0.0;   ///< on the clock of the motion that passes the current goal
   std::size_t pass_goal_ = 0;  ///< index of the goal after the one that is passed
-  double next_length_ = 0.0, next_margin_m_ = 0.0, next_passed_by_s_ = 0.0;
-  std::size_t next_option_ = 0;
-  double next_s_ = 0.0;   ///< on the clock of the motion before
-  double ahead_s_ = 0.0;  ///< from when on the next motion is asked for
+  double ahead_s_ = 0.0;       ///< from when on the next motion is asked for
   timing::TimedPath::Place beginning_;
   Eigen::Index count_ = 0;  ///< way-points of the path
   double margin_m_ = 0.0;   ///< that it keeps
