@@ -99,13 +99,13 @@ void WayFollower::set_jacobian() {
   dynamics::frame_jacobian(model_, ws_, model_.robot().tip.link,
                            dynamics::tip_pose(model_, ws_).p(), J_);
   J_.topRows<3>() *= tolerance_.rad < std::numbers::pi ? rotation_length : 0.0;
+  G_.noalias() = J_ * J_.transpose();
+  G_.diagonal().array() += reach_damping;
   ++checks_;
 }
 
 void WayFollower::lean(double share) {
   set_jacobian();
-  G_.noalias() = J_ * J_.transpose();
-  G_.diagonal().array() += reach_damping;
   step_ = std::min(1.0, lean_rate * share) * (bias_ - q_);
   const Eigen::Matrix<double, 6, 1> moved = J_ * step_;
   step_.noalias() -= J_.transpose() * G_.llt().solve(moved);
@@ -124,29 +124,12 @@ bool WayFollower::reach(const geometry::SE3& target) {
     if (error.tail<3>().norm() < on_curve_share * tolerance_.m &&
         error.head<3>().norm() < rotation_length * on_curve_share * tolerance_.rad)
       return true;
-    set_step(error);
+    step_.noalias() = J_.transpose() * G_.llt().solve(error);
     const double largest = step_.lpNorm<Eigen::Infinity>();
     if (largest > reach_step) step_ *= reach_step / largest;
     q_ = (q_ + step_).cwiseMax(box_.lower).cwiseMin(box_.upper);
   }
   return false;
-}
-
-// Joints that would pass their limits stay, and the others do the rest.
-void WayFollower::set_step(const Eigen::Matrix<double, 6, 1>& error) {
-  for (bool open = true; open;) {
-    open = false;
-    G_.noalias() = J_ * J_.transpose();
-    G_.diagonal().array() += reach_damping;
-    step_.noalias() = J_.transpose() * G_.llt().solve(error);
-    for (Index j = 0; j < q_.size(); ++j) {
-      const bool stays =
-          (step_[j] < 0.0 && q_[j] <= box_.lower[j]) || (step_[j] > 0.0 && q_[j] >= box_.upper[j]);
-      if (!stays) continue;
-      J_.col(j).setZero();
-      open = true;
-    }
-  }
 }
 
 std::string WayFollower::describe(Failure failure) const {

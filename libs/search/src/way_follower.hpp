@@ -43,8 +43,7 @@ class WayFollower {
   [[nodiscard]] bool reach(const geometry::SE3& target);
   /// Moves q_ towards the bias without moving the tip.
   void lean(double share);
-  void set_jacobian();
-  void set_step(const Eigen::Matrix<double, 6, 1>& error);
+  void set_jacobian();  ///< and J Jᵀ, damped
   [[nodiscard]] std::string describe(Failure failure) const;
 
   const model::Model& model_;
