@@ -1,7 +1,10 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "command_line.hpp"
 #include "commands.hpp"
@@ -31,6 +34,22 @@ std::string cell(const Json& value) {
   return value.is_null() ? "-" : fmt::format("{:.4g}", value.get<double>());
 }
 
+// The names of all frames, by the link that they move with.
+std::string frames_text(const Json& frames) {
+  std::vector<std::string> names;
+  for (const auto& frame : frames) {
+    const std::string name = frame["name"].get<std::string>();
+    const Json& link = frame["link"];
+    if (link.is_null())
+      names.push_back(name + " (does not move)");
+    else if (link == name)
+      names.push_back(name);
+    else
+      names.push_back(fmt::format("{} (on {})", name, link.get<std::string>()));
+  }
+  return fmt::format("frames: {}\n", fmt::join(names, ", "));
+}
+
 void print_table(const Json& robot) {
   fmt::print("{}: {}, {} joints, {}, {:.4g} kg, tip '{}' on link '{}', reach at most {:.3g} m\n",
              robot["file"].get<std::string>(), robot["name"].get<std::string>(),
@@ -49,6 +68,7 @@ void print_table(const Json& robot) {
                cell(link["mass_kg"]), link["spheres"].get<std::size_t>(),
                link["capsules"].get<std::size_t>());
   fmt::print("units: rad, m, kg, s, N, Nm; a dash means none\n");
+  fmt::print("{}", frames_text(robot["frames"]));
   if (robot["spheres"] == 0 && robot["capsules"] == 0)
     fmt::print(
         "no collision spheres or capsules: collisions are not checked; add <collision><sphere> or "

@@ -134,6 +134,9 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
                              number(r["dissipated_J"]), number(r["held_work_J"]),
                              number(r["gyroscopic_work_J"], 2), number(r["node_work_J"]),
                              number(r["filter_work_J"], 3), number(r["recovery_work_J"], 3)));
+  if (r.contains("external_work_J"))
+    line("pushes",
+         fmt::format("wrenches of the surroundings did {} J", number(r["external_work_J"])));
   const auto& solver = r["solver"];
   line("solver",
        fmt::format("{} updates per step, {} at most; residual {} at most ({}); {} halvings",

@@ -14,6 +14,7 @@
 namespace hamelin::description {
 
 using geometry::SE3;
+using model::Frame;
 using model::Joint;
 using model::JointType;
 using model::Link;

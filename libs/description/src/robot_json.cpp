@@ -127,6 +127,32 @@ Json json_of(const Link& link) {
   return json;
 }
 
+// A frame without a link is on the base; one without a name has that of its link.
+Frame frame_of(const Json& json, const std::vector<std::string>& links, const std::string& where) {
+  Frame frame{json.value("name", ""), -1, pose_of(json, where)};
+  if (!json.contains("link")) return frame;
+  const auto name = json["link"].get<std::string>();
+  const auto at = std::find(links.begin(), links.end(), name);
+  if (at == links.end())
+    throw Error(ErrorCode::invalid, fmt::format("{}/link: no link '{}', expected one of {}", where,
+                                                name, detail::join(links)));
+  frame.link = static_cast<int>(at - links.begin());
+  if (frame.name.empty()) frame.name = name;
+  return frame;
+}
+
+Json json_of(const Frame& frame, const Robot& robot) {
+  Json json = Json::object();
+  std::string moving;
+  if (frame.link >= 0) {
+    moving = robot.links.at(static_cast<std::size_t>(frame.link)).name;
+    json["link"] = moving;
+  }
+  if (frame.name != moving) json["name"] = frame.name;
+  put_pose(json, frame.pose);
+  return json;
+}
+
 // One pass of R → quaternion → R.
 Matrix3d through_quaternion(const Matrix3d& R) {
   return geometry::rotation_from_wxyz(geometry::quaternion_wxyz(R));
@@ -304,6 +330,19 @@ void apply_srdf(Robot& robot, const std::filesystem::path& file) {
   robot.notes.push_back(note);
 }
 
+// The tip and a frame change places.
+void choose_tip(Robot& robot, const std::string& name, const std::string& where) {
+  std::vector<std::string> names{robot.tip.name};
+  for (Frame& frame : robot.frames) {
+    if (frame.link < 0) continue;
+    if (frame.name == name) return std::swap(frame, robot.tip);
+    names.push_back(frame.name);
+  }
+  throw Error(ErrorCode::invalid,
+              fmt::format("{}: no frame '{}' on a moving link for the tip, expected one of {}",
+                          where, name, detail::join(names)));
+}
+
 }  // namespace
 
 std::string detail::join(const std::vector<std::string>& names) {
@@ -327,6 +366,7 @@ void detail::round_to_quaternions(Robot& robot) {
   const auto round = [](const SE3& pose) { return SE3(rounded(pose.R()), pose.p()); };
   for (auto& link : robot.links) link.com = round(link.com);
   robot.tip.pose = round(robot.tip.pose);
+  for (auto& frame : robot.frames) frame.pose = round(frame.pose);
 }
 
 std::string detail::normalise_screw(Joint& joint, const std::string& where) {
@@ -391,14 +431,10 @@ Robot robot_from_json(const Json& document, const std::string& where) {
     names.push_back(link.name);
     robot.links.push_back(std::move(link));
   }
-  const Json& tip = document["tip"];
-  const auto at = std::find(names.begin(), names.end(), tip["link"].get<std::string>());
-  if (at == names.end())
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: /tip/link: no link '{}', expected one of {}", where,
-                            tip["link"].get<std::string>(), detail::join(names)));
-  robot.tip = {tip.value("name", *at), static_cast<int>(at - names.begin()),
-               pose_of(tip, where + ": /tip")};
+  robot.tip = frame_of(document["tip"], names, where + ": /tip");
+  for (const auto& json : list_of(document, "frames"))
+    robot.frames.push_back(
+        frame_of(json, names, fmt::format("{}: /frames/{}", where, robot.frames.size())));
   for (const auto& sphere : list_of(document, "base_spheres"))
     robot.base_spheres.push_back(sphere_of(sphere));
   for (const auto& segment : list_of(document, "base_segments"))
@@ -415,12 +451,13 @@ Robot robot_from_json(const Json& document, const std::string& where) {
 
 Json robot_to_json(const Robot& robot) {
   Json json{{"schema", schema_name}, {"name", robot.name}};
-  const std::string& moving = robot.links.at(static_cast<std::size_t>(robot.tip.link)).name;
-  json["tip"] = {{"link", moving}};
-  if (robot.tip.name != moving) json["tip"]["name"] = robot.tip.name;
-  put_pose(json["tip"], robot.tip.pose);
+  json["tip"] = json_of(robot.tip, robot);
   json["links"] = Json::array();
   for (const auto& link : robot.links) json["links"].push_back(json_of(link));
+  if (!robot.frames.empty()) {
+    json["frames"] = Json::array();
+    for (const auto& frame : robot.frames) json["frames"].push_back(json_of(frame, robot));
+  }
   if (!robot.base_spheres.empty()) {
     json["base_spheres"] = Json::array();
     for (const auto& sphere : robot.base_spheres) json["base_spheres"].push_back(json_of(sphere));
@@ -449,10 +486,7 @@ Robot read_robot(const std::filesystem::path& file, const RobotOptions& options)
   if (options.strict)
     for (const Link& link : robot.links)
       detail::check_triangle_inequality(robot, link.name, link.inertia_kg_m2, true, where);
-  if (options.tip && *options.tip != robot.tip.name)
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: no tip '{}', expected '{}', the only tip of a JSON robot", where,
-                            *options.tip, robot.tip.name));
+  if (options.tip && *options.tip != robot.tip.name) choose_tip(robot, *options.tip, where);
   if (const auto sidecar = detail::sidecar_of(options)) {
     replace_shapes(robot, *sidecar);
     model::check(robot, sidecar->where);

@@ -66,6 +66,10 @@ class Reader {
     keep_base_shapes();
     const std::string& tip = tree_.tip->name();
     robot_.tip = {tip, static_cast<int>(tree_.bodies.size()) - 1, tree_.poses.at(tip)};
+    for (const UrdfLink* link : tree_.order)
+      if (link != tree_.tip)
+        robot_.frames.push_back(
+            {link->name(), tree_.body_of.at(link->name()), tree_.poses.at(link->name())});
     disable_pairs();
     note_skipped();
     detail::round_to_quaternions(robot_);

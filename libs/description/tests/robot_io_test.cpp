@@ -581,8 +581,9 @@ TEST_CASE("a bad JSON robot is refused with its place", "[description][robot]") 
              Catch::Contains("joint 'j1': lower limit 1 is not below upper limit 0"));
   RobotOptions options;
   options.tip = "hand";
-  CHECK_THAT(message_of("good.json", good.dump(), options),
-             Catch::Contains("no tip 'hand', expected 'link7', the only tip of a JSON robot"));
+  CHECK_THAT(
+      message_of("good.json", good.dump(), options),
+      Catch::Contains("no frame 'hand' on a moving link for the tip, expected one of link7"));
 }
 
 TEST_CASE("a robot survives its JSON form bit for bit", "[description][robot]") {

@@ -4,6 +4,7 @@
 
 #include "derivative_kernels.hpp"
 #include "hamelin/core/isa_kernels.hpp"
+#include "named_frames.hpp"
 
 namespace hamelin::dynamics {
 
@@ -18,10 +19,6 @@ namespace {
 using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-geometry::Vec3<double> vec3(const Vector3d& x) {
-  return {x.x(), x.y(), x.z()};
-}
 
 // The particles of a link about the origin of its joint-aligned frame, from its COM frame.
 kernel::DerivativeLink link_of(const model::Link& link, const geometry::SE3& com) {
@@ -115,6 +112,7 @@ DerivativesWorkspace::DerivativesWorkspace(const model::Model& model, Isa isa)
       sweep(kernels->bytes(static_cast<std::size_t>(model.dof()))),
       matrices(5 * kernels->leading(static_cast<std::size_t>(model.dof())) *
                static_cast<std::size_t>(model.dof()) * sizeof(double)),
+      external(model.dof(), model.dof()),
       frames(static_cast<std::size_t>(model.dof())) {
   // what packets read beyond the last joint must be finite
   const auto n = static_cast<std::size_t>(model.dof());

@@ -7,6 +7,7 @@
 #include "hamelin/dynamics/kernel/planar.hpp"
 #include "hamelin/dynamics/kernel/spatial.hpp"
 #include "kernels.hpp"
+#include "named_frames.hpp"
 
 namespace hamelin::dynamics {
 
@@ -43,11 +44,6 @@ const Frame& frame(const Workspace& ws, int link) {
   return ws.frames[static_cast<std::size_t>(link)];
 }
 
-bool is_prismatic(const Model& model, int link) {
-  return model.robot().links[static_cast<std::size_t>(link)].joint.type ==
-         model::JointType::prismatic;
-}
-
 // Checks a link index that a caller gave.
 void check_link(const char* function, const Workspace& ws, int link) {
   if (link < 0 || link >= ws.owner.dof) [[unlikely]]
@@ -71,13 +67,20 @@ void check_shapes(const char* function, const char* argument, const Model& model
     detail::refuse_count(function, argument, given.size(), model.shapes().size());
 }
 
-// The world velocity per rate of joint j of a point that the joint moves.
-Vector3d velocity_column(const Model& model, const Workspace& ws, int j, const Vector3d& point) {
-  const Frame& f = frame(ws, j);
-  return is_prismatic(model, j) ? f.axis : Vector3d(f.axis.cross(point - f.p));
-}
-
 }  // namespace
+
+void gather_forces(const Model& model, Workspace& ws, double* tau) {
+  for (int i = model.dof() - 1; i >= 0; --i) {
+    const Frame& f = frame(ws, i);
+    const auto& total = ws.forces[static_cast<std::size_t>(i)];
+    tau[i] = f.axis.dot(is_prismatic(model, i) ? total.linear : total.angular);
+    if (const int up = parent(model, i); up >= 0) {
+      auto& parent_total = ws.forces[static_cast<std::size_t>(up)];
+      parent_total.linear += total.linear;
+      parent_total.angular += total.angular + (f.p - frame(ws, up).p).cross(total.linear);
+    }
+  }
+}
 
 Vector3d point_position(const Model& model, const Workspace& ws, int link,
                         const Vector3d& point_link) {
@@ -195,16 +198,7 @@ void gyroscopic_torque(const Model& model, Workspace& ws, const double* q, const
     total.linear += force;
     total.angular += arm.cross(force);
   }
-  for (int i = n - 1; i >= 0; --i) {
-    const Frame& f = frame(ws, i);
-    const auto& total = ws.forces[static_cast<std::size_t>(i)];
-    tau[i] = f.axis.dot(is_prismatic(model, i) ? total.linear : total.angular);
-    if (const int up = parent(model, i); up >= 0) {
-      auto& parent_total = ws.forces[static_cast<std::size_t>(up)];
-      parent_total.linear += total.linear;
-      parent_total.angular += total.angular + (f.p - frame(ws, up).p).cross(total.linear);
-    }
-  }
+  gather_forces(model, ws, tau);
 }
 
 Matrix3d operational_inertia(const Model& model, Workspace& ws, const double* q,

@@ -3,6 +3,7 @@
 
 #include "hamelin/dynamics/derivatives.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/dynamics/wrenches.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/test/readme.hpp"
 
@@ -18,9 +19,14 @@ Eigen::VectorXd tau(7), a(7);
 dynamics::gravity_torque(arm, ws, q, tau);
 dynamics::forward_dynamics(arm, ws, q, v, tau, a);  // gravity is held, so M a = -C v
 dynamics::forward_kinematics(arm, ws, q);
-const Eigen::Vector3d tip = dynamics::tip_pose(arm, ws).p();
-dynamics::Matrix3Xd J(3, 7);
-dynamics::point_jacobian(arm, ws, arm.robot().tip.link, tip, J);  // the tip's velocity is J v
+const int tip = arm.frame("link7");  // by its name; the tip of a chain has that of its last link
+const Eigen::Vector3d at = dynamics::frame_pose(arm, ws, tip).p();
+dynamics::Matrix6Xd J(6, 7);  // J v is the tip's twist, angular part first
+dynamics::frame_jacobian(arm, ws, tip, dynamics::Reference::local_world_aligned, J);
+dynamics::ExternalWrench push{.frame = tip};
+push.wrench << 0.0, 0.0, 0.0, 0.0, 0.0, -5.0;
+Eigen::VectorXd loaded(7);  // what the joints exert while the tip is pushed down by 5 N
+dynamics::inverse_dynamics(arm, ws, q, v, a, {&push, 1}, loaded);
 dynamics::DerivativesWorkspace derivatives(arm);
 Eigen::MatrixXd by_q(7, 7), by_v(7, 7), by_tau(7, 7);  // row i: the acceleration of joint i
 dynamics::forward_dynamics_derivatives(arm, derivatives, q, v, tau, a, by_q, by_v, by_tau);
@@ -35,8 +41,11 @@ dynamics::forward_dynamics_derivatives(arm, derivatives, q, v, tau, a, by_q, by_
   CHECK(bias.norm() > 1.0);
   const double e = 1e-6;
   dynamics::forward_kinematics(arm, ws, q + e * v);
+  CHECK((loaded - tau - J.bottomRows<3>().transpose() * Eigen::Vector3d(0, 0, 5)).norm() < 1e-12);
+  CHECK((at - dynamics::tip_pose(arm, ws).p()).norm() < 1e-5);
   const Eigen::Vector3d ahead = dynamics::tip_pose(arm, ws).p();
   dynamics::forward_kinematics(arm, ws, q - e * v);
-  CHECK(((ahead - dynamics::tip_pose(arm, ws).p()) / (2.0 * e) - J * v).norm() < 1e-9);
+  CHECK(((ahead - dynamics::tip_pose(arm, ws).p()) / (2.0 * e) - J.bottomRows<3>() * v).norm() <
+        1e-9);
   test::check_readme_example("libs/dynamics");
 }

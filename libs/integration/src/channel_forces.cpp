@@ -2,8 +2,8 @@
 
 namespace hamelin::integration {
 
-ChannelForces::ChannelForces(const Model& model)
-    : model_(model), total_(VectorXd::Zero(model.dof())) {
+ChannelForces::ChannelForces(const Model& model, WrenchForces& wrenches)
+    : model_(model), wrenches_(wrenches), total_(VectorXd::Zero(model.dof())) {
   for (Part* part : parts_) part->force = total_;
 }
 
@@ -18,6 +18,7 @@ void ChannelForces::sum(const Channels& channels, dynamics::Workspace& ws, const
         channels.coulomb.cwiseProduct((v / channels.coulomb_speed).array().tanh().matrix());
   if ((gyroscopic_.active = !channels.gyroscopic.empty()))
     dynamics::gyroscopic_torque(model_, ws, q, v, channels.gyroscopic, gyroscopic_.force);
+  if ((external_.active = !channels.wrenches.empty())) external_.force = wrenches_.evaluate(q, v);
   total_.setZero();
   for (const Part* part : parts_)
     if (part->active) total_ += part->sign * part->force;

@@ -2,6 +2,7 @@
 #include <array>
 
 #include "hamelin/integration/integrator.hpp"
+#include "wrench_forces.hpp"
 
 namespace hamelin::integration {
 
@@ -9,7 +10,8 @@ namespace hamelin::integration {
 /// work on joint vectors. (The kernels of gauss and hamel-variational use kernel/forces.hpp.)
 class ChannelForces {
  public:
-  explicit ChannelForces(const Model& model);
+  /// Both must outlive this. @param wrenches of the current step
+  ChannelForces(const Model& model, WrenchForces& wrenches);
   ChannelForces(const ChannelForces&) = delete;
   ChannelForces& operator=(const ChannelForces&) = delete;
 
@@ -36,11 +38,13 @@ class ChannelForces {
     VectorXd force{};
   };
   const Model& model_;
+  WrenchForces& wrenches_;
   bool any_ = false;
   VectorXd total_;
   Part held_{&StepReport::held_work_J, 1.0}, damping_{&StepReport::dissipated_J, -1.0},
-      coulomb_{&StepReport::dissipated_J, -1.0}, gyroscopic_{&StepReport::gyroscopic_work_J, 1.0};
-  std::array<Part*, 4> parts_{&held_, &damping_, &coulomb_, &gyroscopic_};
+      coulomb_{&StepReport::dissipated_J, -1.0}, gyroscopic_{&StepReport::gyroscopic_work_J, 1.0},
+      external_{&StepReport::external_work_J, 1.0};
+  std::array<Part*, 5> parts_{&held_, &damping_, &coulomb_, &gyroscopic_, &external_};
 };
 
 }  // namespace hamelin::integration

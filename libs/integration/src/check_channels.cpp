@@ -50,6 +50,12 @@ void check_channels(const char* function, const Model& model, const Channels& ch
           ErrorCode::usage,
           formatted("{}: channels.gyroscopic: link {} given, expected an index from 0 to {}",
                     function, term.link, model.dof() - 1));
+  const auto frames = static_cast<int>(model.frames().size());
+  for (const auto& each : channels.wrenches)
+    if (each.frame < 0 || each.frame >= frames)
+      throw Error(ErrorCode::usage,
+                  formatted("{}: channels.wrenches: frame {} given, expected an index from 0 to {}",
+                            function, each.frame, frames - 1));
 }
 
 }  // namespace hamelin::integration

@@ -41,6 +41,7 @@ Composition::Composition(const Model& model, const CompositionOptions& options)
       history_(weights_.size(), StepHistory(model.dof())),
       rate_(VectorXd::Zero(model.dof())) {
   inner_ = step_.start(rate_, rate_);
+  step_.wrenches_ = wrenches_;  // of the step of this scheme
 }
 
 void Composition::begin(State& state, const ConstVectorRef& v0) {

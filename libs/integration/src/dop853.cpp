@@ -149,6 +149,7 @@ void Dop853::stages(const State& state, const Channels& channels, double h, Step
   report.gyroscopic_work_J = b[0] * h * first_.gyroscopic_work_J;
   report.dissipated_J = b[0] * h * first_.dissipated_J;
   report.held_work_J = b[0] * h * first_.held_work_J;
+  report.external_work_J = b[0] * h * first_.external_work_J;
   [&]<std::size_t... s>(std::index_sequence<s...>) {
     (stage<s + 1>(state, channels, h, report), ...);
   }

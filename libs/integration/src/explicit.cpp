@@ -6,7 +6,7 @@ namespace hamelin::integration {
 
 Explicit::Explicit(std::string name, const Model& model, const Settings& settings)
     : Integrator(std::move(name), model, settings),
-      forces_(model),
+      forces_(model, *wrenches_),
       acceleration_(VectorXd::Zero(model.dof())) {}
 
 void Explicit::add_momentum(State& state, const ConstVectorRef& dp) {

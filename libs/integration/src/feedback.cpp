@@ -89,8 +89,8 @@ StepReport Feedback::attempt(State& state, const Channels& channels, double h) {
     v_sum_ += weight * dv_;
   }
   for (Eigen::Index i = 0; i < n; ++i) q_[i] = joint(i, c_sum_[i], s_sum_[i]);
-  const double target =
-      embedded_[2 * n] + report.held_work_J + report.gyroscopic_work_J - report.dissipated_J;
+  const double target = embedded_[2 * n] + report.held_work_J + report.gyroscopic_work_J +
+                        report.external_work_J - report.dissipated_J;
   report.converged = all_finite(q_) && all_finite(v_sum_) && all_finite(c_sum_) &&
                      all_finite(s_sum_) && std::isfinite(target);
   if (!report.converged) return report;

@@ -13,6 +13,7 @@ ForceDerivatives::ForceDerivatives(Index dof)
       by_v(by_q),
       force(VectorXd::Zero(dof)),
       J_(6, dof),
+      slope_(by_q),
       torque_(force) {}
 
 void ForceDerivatives::evaluate(const Model& model, const Channels& channels,
@@ -30,6 +31,12 @@ void ForceDerivatives::evaluate(const Model& model, const Channels& channels,
     const double t = std::tanh(v[i] / channels.coulomb_speed);
     force[i] -= channels.coulomb[i] * t;
     by_v(i, i) -= channels.coulomb[i] / channels.coulomb_speed * (1.0 - t * t);
+  }
+  if (!channels.wrenches.empty()) {
+    dynamics::external_torque(model, ws, q, channels.wrenches, torque_);
+    force += torque_;
+    dynamics::external_torque_derivative(model, ws, q, channels.wrenches, slope_);
+    by_q += slope_;
   }
   if (channels.gyroscopic.empty()) return;
   dynamics::gyroscopic_torque(model, ws, q, v, channels.gyroscopic, torque_);

@@ -5,7 +5,7 @@
 namespace hamelin::integration {
 
 /// The derivatives of the generalised force of the channels by position and velocity, row i the
-/// force of joint i.
+/// force of joint i. Wrenches count as held: the callers refuse a wrench law.
 class ForceDerivatives {
  public:
   explicit ForceDerivatives(Eigen::Index dof);
@@ -21,6 +21,7 @@ class ForceDerivatives {
            const ConstVectorRef& v);
 
   dynamics::Matrix6Xd J_;
+  Eigen::MatrixXd slope_;
   VectorXd torque_;
 };
 

@@ -111,7 +111,7 @@ kernel::GaussOutcome GaussLegendre::solve(const State& state, const Channels& ch
   const kernel::GaussMemory memory_next = memory(memory_next_);
   const kernel::GaussGuess* guess = nullptr;
   if (state.step_previous > 0.0) guess = &guess_for(h / state.step_previous, *memory_next.older_at);
-  const kernel::Forces forces = to_forces(model_, channels, spins_);
+  const kernel::Forces forces = to_forces(model_, channels, spins_, *wrenches_);
   auto outcome = dynamics::kernel::with_group(
       model_, *kernels_, [&]<class Entry, class Chain>(const Entry& entry, const Chain& chain) {
         const kernel::GaussCall<Chain> call{

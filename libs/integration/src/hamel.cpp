@@ -24,7 +24,7 @@ Hamel::Hamel(const Model& model, const HamelOptions& options, bool midpoint)
       options_(options),
       midpoint_(midpoint),
       alpha_(midpoint ? 0.5 : options.alpha),
-      forces_(model) {
+      forces_(model, *wrenches_) {
   const auto n = static_cast<std::size_t>(model.dof());
   if (model.planar())
     links_ = Links<dynamics::kernel::Planar<double>>(n);

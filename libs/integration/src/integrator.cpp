@@ -7,6 +7,7 @@
 #include "hamelin/core/formatted.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "state_owner.hpp"
+#include "wrench_forces.hpp"
 
 namespace hamelin::integration {
 
@@ -14,8 +15,11 @@ Integrator::Integrator(std::string name, const Model& model, const Settings& set
     : model_(model),
       settings_(settings),
       ws_(model, settings.isa),
+      wrenches_(std::make_shared<WrenchForces>(model, ws_)),
       name_(std::move(name)),
       velocity_(VectorXd::Zero(model.dof())) {}
+
+Integrator::~Integrator() = default;
 
 double Integrator::tolerance() const noexcept {
   return adaptive() ? std::max(settings_.rtol, settings_.atol) : settings_.tolerance;
@@ -126,6 +130,7 @@ StepReport merge(const StepReport& a, const StepReport& b) {
   sum.gyroscopic_work_J += b.gyroscopic_work_J;
   sum.dissipated_J += b.dissipated_J;
   sum.held_work_J += b.held_work_J;
+  sum.external_work_J += b.external_work_J;
   return sum;
 }
 
@@ -135,14 +140,19 @@ namespace {
 // copies.
 void mark_failed(StepReport& report) {
   report.converged = false;
-  report.step_s = report.gyroscopic_work_J = report.dissipated_J = report.held_work_J = 0.0;
+  report.step_s = report.gyroscopic_work_J = report.dissipated_J = report.held_work_J =
+      report.external_work_J = 0.0;
 }
 
 }  // namespace
 
 StepReport Integrator::step(State& state, const Channels& channels, double h) {
   check("step", state, channels, h);
-  return adaptive() ? take_controlled_steps(state, channels, h) : take_step(state, channels, h);
+  wrenches_->begin(channels);
+  const StepReport report =
+      adaptive() ? take_controlled_steps(state, channels, h) : take_step(state, channels, h);
+  wrenches_->end();
+  return report;
 }
 
 StepReport Integrator::take_controlled_steps(State& state, const Channels& channels, double h) {
@@ -169,7 +179,10 @@ StepReport Integrator::take_controlled_steps(State& state, const Channels& chann
 
 StepReport Integrator::advance(State& state, const Channels& channels, double limit) {
   check("advance", state, channels, limit);
-  return take_step(state, channels, limit);
+  wrenches_->begin(channels);
+  const StepReport report = take_step(state, channels, limit);
+  wrenches_->end();
+  return report;
 }
 
 StepReport Integrator::take_step(State& state, const Channels& channels, double limit) {

@@ -6,6 +6,7 @@
 #include "hamelin/dynamics/kernel/sweeps.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "kernel/forces.hpp"
+#include "wrench_forces.hpp"
 
 namespace hamelin::integration {
 
@@ -32,23 +33,26 @@ inline void to_spins(const model::Model& model, std::span<const dynamics::Gyrosc
   }
 }
 
-/// The channels of a step in the form of the kernels. `spins` holds the gyroscopic terms and must
-/// outlive the result.
+/// The channels of a step in the form of the kernels. `spins` holds the gyroscopic terms, and
+/// `wrenches` those of this step; both must outlive the result.
 inline kernel::Forces to_forces(const model::Model& model, const Channels& channels,
-                                std::vector<dynamics::kernel::Spin>& spins) {
+                                std::vector<dynamics::kernel::Spin>& spins,
+                                WrenchForces& wrenches) {
   to_spins(model, channels.gyroscopic, spins);
   return {data_or_null(channels.damping),
           data_or_null(channels.coulomb),
           data_or_null(channels.held_torque),
           channels.coulomb_speed,
           spins.data(),
-          spins.size()};
+          spins.size(),
+          wrenches.for_kernels()};
 }
 
 inline void report_work(const kernel::Work& work, StepReport& report) noexcept {
   report.held_work_J = work.held;
   report.dissipated_J = work.dissipated;
   report.gyroscopic_work_J = work.gyroscopic;
+  report.external_work_J = work.external;
 }
 
 }  // namespace hamelin::integration

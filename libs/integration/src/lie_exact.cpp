@@ -17,7 +17,7 @@ constexpr double largest_correction = 1.0;  // [rad or m]
 LieExact::LieExact(const Model& model, const LieExactOptions& options)
     : Momentum("lie-exact", model, {options.isa, options.max_halvings, options.tolerance}),
       options_(options),
-      forces_(model) {
+      forces_(model, *wrenches_) {
   const auto n = static_cast<std::size_t>(model.dof());
   if (model.planar())
     links_ = kernel::LieScratch<dynamics::kernel::Planar<double>>(n);

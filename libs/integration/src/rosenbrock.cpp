@@ -51,7 +51,7 @@ Rosenbrock::Rosenbrock(const RosenbrockOptions& options, const Model& model)
       factors_(model.dof()) {
   const int n = model.dof();
   by_q_ = by_v_ = matrix_ = Eigen::MatrixXd::Zero(n, n);
-  works_by_q_ = works_by_v_ = Eigen::Matrix3Xd::Zero(3, n);
+  works_by_q_ = works_by_v_ = Eigen::Matrix4Xd::Zero(4, n);
   for (auto* x : {&q_, &v_, &right_q_, &right_v_, &up_}) *x = VectorXd::Zero(n);
   dq_.fill(q_);
   dv_.fill(q_);
@@ -66,7 +66,7 @@ Rosenbrock::Works Rosenbrock::derivative(const Channels& channels, const VectorX
   accelerate(channels, q, v, report);
   StepReport power;
   forces_.add_work(power, v, 1.0);
-  return {power.gyroscopic_work_J, power.dissipated_J, power.held_work_J};
+  return {power.gyroscopic_work_J, power.dissipated_J, power.held_work_J, power.external_work_J};
 }
 
 void Rosenbrock::make_jacobian(const State& state, const Channels& channels, StepReport& report) {
@@ -169,6 +169,7 @@ StepReport Rosenbrock::controlled_step(State& state, const Channels& channels, d
     report.gyroscopic_work_J = works_[0];
     report.dissipated_J = works_[1];
     report.held_work_J = works_[2];
+    report.external_work_J = works_[3];
     control.finish(state, report);
   }
   report.rejected = control.rejected();

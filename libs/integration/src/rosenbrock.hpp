@@ -24,7 +24,7 @@ class Rosenbrock final : public Explicit {
   static constexpr std::size_t stages = 6;
   /// Work of gyroscopic terms, dissipated work, work of held torques; integrated along with the
   /// motion.
-  using Works = Eigen::Vector3d;
+  using Works = Eigen::Vector4d;
 
   StepReport attempt(State& state, const Channels& channels, double h) override;
   StepReport controlled_step(State& state, const Channels& channels, double limit) override;
@@ -38,7 +38,7 @@ class Rosenbrock final : public Explicit {
   [[nodiscard]] double error_norm(const State& state) const;
 
   Eigen::MatrixXd by_q_, by_v_, matrix_;      ///< ∂a/∂q, ∂a/∂v, the matrix that is factored
-  Eigen::Matrix3Xd works_by_q_, works_by_v_;  ///< ∂powers/∂(q, v)
+  Eigen::Matrix4Xd works_by_q_, works_by_v_;  ///< ∂powers/∂(q, v)
   Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
   std::array<VectorXd, stages> dq_, dv_;  ///< the stages' increments
   std::array<Works, stages> dworks_;

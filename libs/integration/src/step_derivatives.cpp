@@ -46,6 +46,9 @@ void StepDifferentiator::differentiate(const State& after, const Channels& chann
   check_shape(function, "out.by_torque", out.by_torque, 2 * n, n);
   check_shape(function, "out.by_step", out.by_step, 2 * n, 1);
   check_channels(function, model_, channels);
+  if (channels.wrench_law)
+    throw Error(ErrorCode::usage,
+                formatted("{}: channels.wrench_law: given, expected held wrenches", function));
   const double h = last_step(after);
   if (after.jumped || !(h > 0.0))
     throw Error(ErrorCode::usage,

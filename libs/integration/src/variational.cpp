@@ -112,7 +112,7 @@ kernel::VariationalOutcome Variational::solve_feedback(const State& state, doubl
 
 StepReport Variational::attempt(State& state, const Channels& channels, double h) {
   p_ = state.p - 0.5 * h * gradient(state.q);
-  forces_ = to_forces(model_, channels, spins_);
+  forces_ = to_forces(model_, channels, spins_, *wrenches_);
   const auto out =
       options_.solver == Solver::newton ? solve_newton(state, h) : solve_feedback(state, h);
   StepReport report;

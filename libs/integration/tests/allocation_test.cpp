@@ -18,6 +18,11 @@ Channels all_channels(int n) {
   channels.coulomb_speed = 0.5;
   channels.held_torque = VectorXd::Constant(n, 0.2);
   channels.gyroscopic = {{2, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX()}};
+  channels.wrenches = {{0, dynamics::Reference::local, dynamics::Vector6d::Ones()}};
+  channels.wrench_law = [](const dynamics::Workspace&, const VectorXd&, const VectorXd& v,
+                           std::span<ExternalWrench> wrenches) {
+    wrenches[0].wrench.setConstant(v[0]);
+  };
   return channels;
 }
 

@@ -205,6 +205,7 @@ Json to_json(const Result& r) {
       {"provenance", r.provenance}};
   if (r.torque_change)
     document["torque_change"] = {{"mean", r.torque_change->mean()}, {"max", r.torque_change->max}};
+  if (r.external_work_J != 0.0) document["external_work_J"] = r.external_work_J;
   if (r.position_excess) document["position_excess"] = *r.position_excess;
   if (r.speed_excess) document["speed_excess"] = *r.speed_excess;
   if (r.shield) document["shield"] = shield(*r.shield);

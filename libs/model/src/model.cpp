@@ -10,6 +10,7 @@
 #include "check_pose.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/formatted.hpp"
+#include "hamelin/core/text.hpp"
 
 namespace hamelin::model {
 
@@ -260,6 +261,18 @@ void check_placement(const std::string& robot, const SE3& base, const Vector3d& 
                           gravity.x(), gravity.y(), gravity.z()));
 }
 
+template <class List, class NameOf>
+int index_of(const char* what, std::string_view name, const std::string& robot, const List& list,
+             const NameOf& name_of) {
+  std::vector<std::string> names;
+  for (const auto& each : list) {
+    if (name_of(each) == name) return static_cast<int>(names.size());
+    names.push_back(name_of(each));
+  }
+  throw Error(ErrorCode::usage,
+              formatted("'{}' has no {} '{}'{}", robot, what, name, did_you_mean(name, names)));
+}
+
 }  // namespace
 
 Model::Identity::Identity() {
@@ -302,7 +315,14 @@ Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
                          com.R() * (0.5 * (segment.to_m - segment.from_m)), segment.radius_m});
     }
   }
-  tip_in_frame_ = frames[static_cast<std::size_t>(robot_.tip.link) + 1].inverse() * robot_.tip.pose;
+  const auto add_frame = [&](const Frame& frame) {
+    const SE3 in_link =
+        frame.link < 0 ? base_ * frame.pose
+                       : frames[static_cast<std::size_t>(frame.link) + 1].inverse() * frame.pose;
+    frames_.push_back({frame.name, frame.link, in_link});
+  };
+  add_frame(robot_.tip);
+  for (const Frame& frame : robot_.frames) add_frame(frame);
   reach_ = reach_of(robot_, frames);
   Hash hash;
   hash.add(std::uint64_t{chain_.index()}).add(root_);
@@ -314,6 +334,21 @@ Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
       chain_);
   for (const SE3& com : com_in_frame_) hash.add(com);
   fingerprint_ = hash.value();
+}
+
+int Model::frame(std::string_view name) const {
+  return index_of("frame", name, robot_.name, frames_,
+                  [](const NamedFrame& frame) -> const std::string& { return frame.name; });
+}
+
+int Model::link(std::string_view name) const {
+  return index_of("link", name, robot_.name, robot_.links,
+                  [](const Link& link) -> const std::string& { return link.name; });
+}
+
+int Model::joint(std::string_view name) const {
+  return index_of("joint", name, robot_.name, robot_.links,
+                  [](const Link& link) -> const std::string& { return link.joint.name; });
 }
 
 std::string Model::describe(const Shape& shape) const {

@@ -145,6 +145,27 @@ void check_joint_inertia(const Robot& robot, const std::string& where) {
   }
 }
 
+bool printable(const std::string& name) {
+  return !name.empty() &&
+         std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < ' '; });
+}
+
+void check_frames(const Robot& robot, const std::string& where) {
+  std::set<std::string> names{robot.tip.name};
+  for (std::size_t i = 0; i < robot.frames.size(); ++i) {
+    const Frame& frame = robot.frames[i];
+    if (!printable(frame.name))
+      fail(where, formatted("frame {} has no name, or a name with control characters", i));
+    const std::string place = formatted("{}: frame '{}'", where, frame.name);
+    if (!names.insert(frame.name).second)
+      fail(place, "the name is given twice, the tip's included");
+    if (frame.link < -1 || frame.link >= robot.dof())
+      fail(place,
+           formatted("the link's index is {}, expected -1 to {}", frame.link, robot.dof() - 1));
+    check_pose(frame.pose, place, "the pose");
+  }
+}
+
 // Checks that each part is on one body only and that disabled pairs name existing parts.
 void check_parts(const Robot& robot, const std::string& where) {
   std::map<std::string, int> body_of;
@@ -243,10 +264,6 @@ std::vector<std::string> warnings(const Robot& robot) {
 void check(const Robot& robot, const std::string& where) {
   if (robot.links.empty()) fail(where, "the robot has no moving link, expected at least one");
   std::set<std::string> links, joints;
-  const auto printable = [](const std::string& name) {
-    return !name.empty() &&
-           std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < ' '; });
-  };
   for (std::size_t i = 0; i < robot.links.size(); ++i) {
     const Link& link = robot.links[i];
     if (!printable(link.name) || !printable(link.joint.name))
@@ -266,6 +283,7 @@ void check(const Robot& robot, const std::string& where) {
     fail(where, formatted("tip: the link's index is {}, expected 0 to {}", robot.tip.link,
                           robot.dof() - 1));
   check_pose(robot.tip.pose, where + ": tip", "the pose");
+  check_frames(robot, where);
   check_parts(robot, where);
   check_joint_inertia(robot, where);
 }

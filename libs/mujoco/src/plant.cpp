@@ -61,6 +61,7 @@ class MujocoPlant final : public simulation::Plant {
   [[nodiscard]] bool step(const VectorXd& torque, double step_s) override {
     model_->opt.timestep = step_s;
     mju_copy(data_->qfrc_applied, torque.data(), model_->nv);
+    if (!wrenches_.empty()) apply_wrenches();
     mj_step2(model_.get(), data_.get());
     report_ = {};
     report_.step_s = step_s;
@@ -83,6 +84,10 @@ class MujocoPlant final : public simulation::Plant {
     build(map_boxes_);
     put_state();
     arrive(true);
+  }
+
+  void push(std::span<const dynamics::ExternalWrench> wrenches) override {
+    wrenches_.assign(wrenches.begin(), wrenches.end());
   }
 
   void change_map(const scene::MapChangeSpec& change) override {
@@ -231,12 +236,27 @@ class MujocoPlant final : public simulation::Plant {
     return true;
   }
 
+  // Adds the wrenches at the node to the joint torques, by MuJoCo's own Jacobians.
+  void apply_wrenches() {
+    dynamics::forward_kinematics(setup_.model, ws_, node_.q);
+    for (const dynamics::ExternalWrench& each : wrenches_) {
+      const int link = setup_.model.frames()[static_cast<std::size_t>(each.frame)].link;
+      if (link < 0) continue;
+      const geometry::SE3 pose = dynamics::frame_pose(setup_.model, ws_, each.frame);
+      const dynamics::Vector6d wrench = dynamics::aligned_wrench(each, pose);
+      mj_applyFT(model_.get(), data_.get(), wrench.data() + 3, wrench.data(), pose.p().data(),
+                 mj_name2id(model_.get(), mjOBJ_BODY, link_name(link).c_str()),
+                 data_->qfrc_applied);
+    }
+  }
+
   // Works of the step that led from the node to the state: torques times the displacement. Damping
   // acts at the velocity at the end of the step.
   void book_work(const VectorXd& torque) {
     for (int i = 0; i < model_->nv; ++i) {
       const double moved = data_->qpos[i] - node_.q[i];
       report_.held_work_J += torque[i] * moved;
+      report_.external_work_J += (data_->qfrc_applied[i] - torque[i]) * moved;
       report_.dissipated_J +=
           (setup_.damping[i] * data_->qvel[i] - data_->qfrc_constraint[i]) * moved;
     }
@@ -279,6 +299,7 @@ class MujocoPlant final : public simulation::Plant {
   int map_boxes_ = 0;  ///< that the model has room for
   NearBoxes near_;
   std::vector<ChangingObstacle> obstacles_;
+  std::vector<dynamics::ExternalWrench> wrenches_;
 };
 
 }  // namespace

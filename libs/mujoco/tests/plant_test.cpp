@@ -12,6 +12,7 @@
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/arm_loop.hpp"
+#include "hamelin/test/frames.hpp"
 
 using namespace hamelin;
 using Eigen::Vector3d;
@@ -88,6 +89,48 @@ TEST_CASE("one step accelerates as hamelin's forward dynamics do", "[mujoco]") {
   robot.links[4].joint.armature = 0.05;
   Rig rig(model::Model(robot, test::tilted_base(), Vector3d(1.0, -2.0, -9.0)));
   CHECK(deviation(rig, 3) <= 1e-9);
+}
+
+TEST_CASE("a pushed arm moves as hamelin's integrators say, the nearer the smaller MuJoCo's step",
+          "[mujoco]") {
+  Rig rig(test::model_with_frames(5, 6, 3, false));
+  const std::vector<dynamics::ExternalWrench> pushes{
+      {model::Model::tip_frame, dynamics::Reference::local_world_aligned,
+       (dynamics::Vector6d() << 1.0, -2.0, 0.5, 10.0, 5.0, -8.0).finished()},
+      {rig.model.frame("lumped2"), dynamics::Reference::local,
+       (dynamics::Vector6d() << 0.0, 1.0, 0.0, -6.0, 4.0, 2.0).finished()},
+      {rig.model.frame("own3"), dynamics::Reference::world,
+       (dynamics::Vector6d() << 2.0, 0.0, -1.0, 3.0, -3.0, 5.0).finished()}};
+  const VectorXd q = VectorXd::Constant(6, 0.2), rest = VectorXd::Zero(6);
+  constexpr double duration = 0.2;
+  const auto integrator = integration::make_integrator("gauss:8", rig.model);
+  integration::Channels channels;
+  channels.wrenches = pushes;
+  integration::State state = integrator->start(q, rest);
+  for (int k = 0; k < 200; ++k)
+    REQUIRE(integrator->step(state, channels, duration / 200).converged);
+  double difference[3], unpushed = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const int steps = 200 << i;
+    simulation::Plant& plant = rig.start(q, rest);
+    plant.push(pushes);
+    double work = 0.0;
+    const double before = plant.energy().total();
+    for (int k = 0; k < steps; ++k) {
+      REQUIRE(plant.step(rest, duration / steps));
+      work += plant.report().external_work_J;
+    }
+    difference[i] = (plant.node().q - state.q).norm();
+    CHECK(std::abs(plant.energy().total() - before - work) <= 0.05 * std::abs(work));
+  }
+  for (int i = 0; i < 2; ++i) {
+    CHECK(difference[i] / difference[i + 1] > 1.8);
+    CHECK(difference[i] / difference[i + 1] < 2.2);
+  }
+  simulation::Plant& plant = rig.start(q, rest);
+  for (int k = 0; k < 200; ++k) REQUIRE(plant.step(rest, duration / 200));
+  unpushed = (plant.node().q - state.q).norm();
+  CHECK(unpushed > 100.0 * difference[0]);
 }
 
 TEST_CASE("inertias that MuJoCo's compiler refuses are simulated", "[mujoco]") {

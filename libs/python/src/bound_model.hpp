@@ -2,6 +2,7 @@
 #include <memory>
 #include <utility>
 
+#include "hamelin/dynamics/derivatives.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/model/model.hpp"
 #include "whole.hpp"
@@ -15,8 +16,17 @@ struct BoundModel : Whole {
   BoundModel(const BoundModel&) = delete;
   BoundModel& operator=(const BoundModel&) = delete;
 
+  /// Scratch memory for derivatives, made when it is first used.
+  dynamics::DerivativesWorkspace& derivatives() {
+    if (!derivatives_) derivatives_ = std::make_unique<dynamics::DerivativesWorkspace>(model);
+    return *derivatives_;
+  }
+
   const model::Model model;
   dynamics::Workspace ws;
+
+ private:
+  std::unique_ptr<dynamics::DerivativesWorkspace> derivatives_;
 };
 
 using SharedModel = std::shared_ptr<BoundModel>;

@@ -4,13 +4,16 @@
 
 #include <cmath>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "arguments.hpp"
 #include "bound_model.hpp"
+#include "frame_arguments.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/integration/integrator.hpp"
+#include "hamelin/integration/step_derivatives.hpp"
 #include "hamelin/simulation/integrator_options.hpp"
 #include "interrupts.hpp"
 #include "module.hpp"
@@ -29,14 +32,16 @@ using PyReport = Boxed<StepReport>;
 
 // hamelin.Integrator. It holds Python's lock during a step, whose scratch memory it owns.
 struct BoundIntegrator : Whole {
-  BoundIntegrator(SharedModel given, const std::string& name, const Json& options)
+  BoundIntegrator(SharedModel given, const std::string& name, const Json& json)
       : model(std::move(given)),
-        scheme(integration::make_integrator(
-            name, model->model,
-            simulation::integrator_options(options, fmt::format("Integrator: {}", name)))) {}
+        options(integration::make_options(
+            name, simulation::integrator_options(json, fmt::format("Integrator: {}", name)))),
+        scheme(integration::make_integrator(model->model, options)) {}
 
   SharedModel model;
+  integration::Options options;
   std::unique_ptr<integration::Integrator> scheme;
+  std::unique_ptr<integration::StepDifferentiator> differentiator;  // made when first used
   bool busy = false;  // a call runs without Python's lock, or calls back
 };
 
@@ -91,15 +96,35 @@ std::vector<dynamics::GyroscopicTerm> terms_of(py::handle given) {
   return terms;
 }
 
+// Calls a law of Python, which returns moments and forces, one row per wrench.
+auto law_of(const py::object& law) {
+  return [law](const dynamics::Workspace&, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+               std::span<dynamics::ExternalWrench> wrenches) {
+    const py::gil_scoped_acquire locked;
+    const py::object given = law(to_array(q), to_array(v));
+    const Numbers numbers("Channels", "wrench_law", given);
+    const auto count = static_cast<py::ssize_t>(wrenches.size());
+    if (numbers.dimensions() != 2 || numbers.extent(0) != count || numbers.extent(1) != 6)
+      refuse("Channels", "wrench_law",
+             fmt::format("it returned shape {}, expected ({}, 6)", describe_shape(numbers.array()),
+                         count));
+    for (std::size_t i = 0; i < wrenches.size(); ++i)
+      wrenches[i].wrench = Eigen::Map<const dynamics::Vector6d>(numbers.data() + 6 * i);
+  };
+}
+
 std::shared_ptr<PyChannels> make_channels(py::handle damping, py::handle coulomb,
                                           double coulomb_speed, py::handle gyroscopic,
-                                          py::handle held_torque) {
+                                          py::handle held_torque, py::handle wrenches,
+                                          const py::object& wrench_law) {
   Channels channels;
   channels.damping = free_vector("damping", damping);
   channels.coulomb = free_vector("coulomb", coulomb);
   channels.coulomb_speed = coulomb_speed;
   channels.gyroscopic = terms_of(gyroscopic);
   channels.held_torque = free_vector("held_torque", held_torque);
+  channels.wrenches = wrenches_of("Channels", wrenches);
+  if (!wrench_law.is_none()) channels.wrench_law = law_of(wrench_law);
   return boxed(std::move(channels));
 }
 
@@ -138,6 +163,7 @@ class Motion {
     residual_.push_back(report.residual);
     dissipated_.push_back(report.dissipated_J);
     held_work_.push_back(report.held_work_J);
+    external_work_.push_back(report.external_work_J);
     pending_.reset();
   }
   [[nodiscard]] py::dict to_python(bool completed) const {
@@ -156,6 +182,7 @@ class Motion {
     out["residual"] = column(residual_);
     out["dissipated_J"] = column(dissipated_);
     out["held_work_J"] = column(held_work_);
+    out["external_work_J"] = column(external_work_);
     return out;
   }
 
@@ -168,7 +195,7 @@ class Motion {
   Eigen::Index dof_;
   std::vector<double> time_, q_, v_, kinetic_, potential_;
   std::vector<std::int64_t> updates_, evaluations_, factorizations_, halvings_, rejected_;
-  std::vector<double> residual_, dissipated_, held_work_;
+  std::vector<double> residual_, dissipated_, held_work_, external_work_;
   std::optional<StepReport> pending_;
   StepReport none_;
 };
@@ -268,6 +295,9 @@ void add_state(py::module_& module) {
           "q", [](const PyState& s) { return to_array(s.q); },
           "Joint positions, shape (n,) [rad or m]; a copy.")
       .def_property_readonly(
+          "momentum", [](const PyState& s) { return to_array(s.p); },
+          "Momenta at the node, shape (n,) [Nm s or N s], of schemes that step them; a copy.")
+      .def_property_readonly(
           "step_next", [](const PyState& s) { return s.step_next; },
           "Next step under step control [s].")
       .def(
@@ -302,6 +332,7 @@ void add_report(py::module_& module) {
       .def_readonly("dissipated_J", &StepReport::dissipated_J,
                     "Work of damping and dry friction [J], positive.")
       .def_readonly("held_work_J", &StepReport::held_work_J, "Work of the held torque [J].")
+      .def_readonly("external_work_J", &StepReport::external_work_J, "Work of the wrenches [J].")
       .def("__repr__", [](const PyReport& r) {
         return fmt::format("<hamelin.StepReport {}, {:.6g} s, {} updates, residual {:.3g}>",
                            r.converged ? "converged" : "not converged", r.step_s, r.updates,
@@ -315,10 +346,14 @@ void add_channels(py::module_& module) {
       .def(py::init(&make_channels), py::kw_only(), py::arg("damping") = py::none(),
            py::arg("coulomb") = py::none(), py::arg("coulomb_speed") = 0.01,
            py::arg("gyroscopic") = py::tuple(), py::arg("held_torque") = py::none(),
+           py::arg("wrenches") = py::none(), py::arg("wrench_law") = py::none(),
            "damping: viscous, shape (n,) [Nms/rad or Ns/m]. coulomb: dry friction, shape (n,)\n"
            "[Nm or N], viscous below coulomb_speed [rad/s or m/s]. Steps refuse negative ones.\n"
            "gyroscopic: terms (link, point, w), with the point in the link's centre-of-mass frame\n"
-           "[m] and w in the world [N s/m]. held_torque: shape (n,) [Nm or N].")
+           "[m] and w in the world [N s/m]. held_torque: shape (n,) [Nm or N].\n"
+           "wrenches: as Model.wrench() makes them, held over a step. wrench_law(q, v): returns\n"
+           "their moments and forces at a state, shape (number of wrenches, 6); it is called\n"
+           "several times per step.")
       .def_property_readonly(
           "damping", [](const PyChannels& c) { return to_array(c.damping); },
           "Viscous damping, shape (n,) or (0,); a copy.")
@@ -356,6 +391,30 @@ std::shared_ptr<PyState> start(BoundIntegrator& integrator, py::handle q0, py::h
       v0.is_none() ? Eigen::VectorXd::Zero(dof) : vector_of("start", "v0", v0, dof);
   const Use use(integrator);
   return boxed(integrator.scheme->start(q, v));
+}
+
+// A matrix as an array in C order.
+py::array_t<double> rows_of(const Eigen::MatrixXd& from) {
+  auto out = new_array({from.rows(), from.cols()});
+  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+      out.mutable_data(), from.rows(), from.cols()) = from;
+  return out;
+}
+
+py::dict step_derivatives(BoundIntegrator& integrator, const PyState& state,
+                          const PyChannels* channels) {
+  const Use use(integrator);
+  if (!integrator.differentiator)
+    integrator.differentiator =
+        integration::make_step_differentiator(integrator.model->model, integrator.options);
+  integration::StepDerivatives found(integrator.model->model.dof());
+  integrator.differentiator->differentiate(state, given_or_none(channels), found);
+  py::dict out;
+  out["step_s"] = found.step_s;
+  out["by_state"] = rows_of(found.by_state);
+  out["by_torque"] = rows_of(found.by_torque);
+  out["by_step"] = to_array(found.by_step);
+  return out;
 }
 
 py::array_t<double> velocity(BoundIntegrator& integrator, const PyState& state) {
@@ -406,6 +465,11 @@ void add_integrator(py::module_& module) {
            "steps as needed. Returns a StepReport; if it did not converge, the state is unchanged.")
       .def("advance", &advance, arg("state"), arg("limit"), arg("channels") = py::none(),
            "Takes one step of at most `limit` [s]: of exactly that without step control.")
+      .def("step_derivatives", &step_derivatives, arg("state"), arg("channels") = py::none(),
+           "Exact derivatives of the last step that led to a state, for 'hamel-variational' and\n"
+           "'gauss' with fixed steps; channels: those of the step.\n\n"
+           "Returns a dict: 'by_state' (2 n, 2 n), of positions and momenta by those before;\n"
+           "'by_torque' (2 n, n), by the held torque; 'by_step' (2 n,), by the length 'step_s'.")
       .def("velocity", &velocity, arg("state"),
            "Joint velocities at the node, shape (n,) [rad/s or m/s].")
       .def("energy", &energy, arg("state"), "(kinetic, potential) energy at the node [J].")
@@ -436,8 +500,8 @@ void add_integrator(py::module_& module) {
           "called after each step with a copy of the state; if it returns True, the motion ends.\n"
           "Returns a dict of arrays: for N nodes 'time_s' (N,), 'q', 'v' (N, n), 'kinetic_J',\n"
           "'potential_J' (N,); for the intervals between them 'updates', 'evaluations',\n"
-          "'factorizations', 'halvings', 'rejected', 'residual', 'dissipated_J', 'held_work_J'\n"
-          "(N - 1,); and 'completed', false if a step did not converge.")
+          "'factorizations', 'halvings', 'rejected', 'residual', 'dissipated_J', 'held_work_J',\n"
+          "'external_work_J' (N - 1,); and 'completed', false if a step did not converge.")
       .def("__repr__", &repr_of_integrator);
 }
 

@@ -1,106 +1,28 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <pybind11/stl.h>
 
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <span>
 
 #include "arguments.hpp"
 #include "bound_model.hpp"
+#include "derivatives.hpp"
+#include "frame_arguments.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/text.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/scene/shapes.hpp"
+#include "kinematics.hpp"
 #include "module.hpp"
+#include "states.hpp"
+#include "wrenches.hpp"
 
 namespace hamelin::python {
 
 namespace {
 
 using dynamics::StatesXd;
-using Layout = Numbers::Layout;
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-// States per pass through the SIMD kernels where arrays are transposed: the block stays in the
-// cache.
-constexpr py::ssize_t block_states = 128;
-// From so many states on, a call releases Python's lock.
-constexpr py::ssize_t states_without_lock = 16;
-
-// Releases Python's lock during long calls.
-class Unlocked {
- public:
-  explicit Unlocked(py::ssize_t states) {
-    if (states >= states_without_lock) release_.emplace();
-  }
-
- private:
-  std::optional<py::gil_scoped_release> release_;
-};
-
-// Joint vectors of one call: a single state, or one state per row.
-class States {
- public:
-  States(const char* function, py::ssize_t dof) : function_(function), dof_(dof) {}
-
-  const Numbers& add(const char* argument, py::handle given) {
-    Numbers& numbers = all_[count_].emplace(function_, argument, given, Layout::rows_or_columns);
-    const Numbers& first = *all_[0];
-    const bool fits = (numbers.dimensions() == 1 || numbers.dimensions() == 2) &&
-                      numbers.extent(numbers.dimensions() - 1) == dof_;
-    if (!fits)
-      refuse(function_, argument,
-             fmt::format("shape {}, expected ({},) or (N, {})", describe_shape(numbers.array()),
-                         dof_, dof_));
-    if (count_ > 0 &&
-        (numbers.dimensions() != first.dimensions() || numbers.extent(0) != first.extent(0)))
-      refuse(function_, argument,
-             fmt::format("shape {}, expected {}, as of the first argument",
-                         describe_shape(numbers.array()), describe_shape(first.array())));
-    ++count_;
-    return numbers;
-  }
-  [[nodiscard]] const Numbers& operator[](std::size_t i) const { return *all_[i]; }
-  [[nodiscard]] bool single() const { return all_[0]->dimensions() == 1; }
-  [[nodiscard]] py::ssize_t count() const { return single() ? 1 : all_[0]->extent(0); }
-  [[nodiscard]] py::ssize_t dof() const noexcept { return dof_; }
-  // Whether all arguments have one joint after the other, as the kernels want them.
-  [[nodiscard]] bool by_columns() const {
-    return std::all_of(all_.begin(), all_.begin() + static_cast<std::ptrdiff_t>(count_),
-                       [](const auto& x) { return x->by_columns(); });
-  }
-  // The state of a row; numbers that are not adjacent are copied to the scratch memory.
-  [[nodiscard]] Eigen::Map<const Eigen::VectorXd> row(std::size_t argument, py::ssize_t i,
-                                                      Eigen::VectorXd& scratch) const {
-    const Numbers& x = *all_[argument];
-    if (!x.by_columns()) return {x.data() + i * dof_, dof_};
-    for (py::ssize_t j = 0; j < dof_; ++j) scratch[j] = x.data()[j * count() + i];
-    return {scratch.data(), dof_};
-  }
-  // Writes states [first, first + count) of an argument to a block, dof x states.
-  void gather(std::size_t argument, py::ssize_t first, py::ssize_t states, StatesXd& out) const {
-    const Numbers& x = *all_[argument];
-    if (x.by_columns()) {
-      for (py::ssize_t j = 0; j < dof_; ++j)
-        std::copy_n(x.data() + j * count() + first, states, out.data() + j * block_states);
-      return;
-    }
-    for (py::ssize_t j = 0; j < dof_; ++j) {
-      const double* const from = x.data() + first * dof_ + j;
-      double* const to = out.data() + j * block_states;
-      for (py::ssize_t i = 0; i < states; ++i) to[i] = from[i * dof_];
-    }
-  }
-
- private:
-  const char* function_;
-  py::ssize_t dof_;
-  std::array<std::optional<Numbers>, 3> all_;
-  std::size_t count_ = 0;
-};
 
 // A call of three joint vectors with kernels for one state and for many.
 template <class Single, class Many>
@@ -149,31 +71,29 @@ py::array_t<double> call_in_lanes(BoundModel& bound, const States& in, const Sin
   return out;
 }
 
-// Calls f(ws, i, out) for each state, where `out` is the memory of its result of these extents.
+// A call of three joint vectors and wrenches: f(ws, x, y, z, wrenches, out), state by state.
 template <class F>
-py::array_t<double> for_each_state(BoundModel& bound, const States& in,
-                                   std::vector<py::ssize_t> extents, F f) {
-  py::ssize_t size = 1;
-  for (const auto extent : extents) size *= extent;
-  if (!in.single()) extents.insert(extents.begin(), in.count());
-  py::array_t<double> out(extents);
-  double* const y = out.mutable_data();
-  const py::ssize_t count = in.count();
-  if (count < states_without_lock) {
-    for (py::ssize_t i = 0; i < count; ++i) f(bound.ws, i, y + i * size);
-    return out;
-  }
-  const py::gil_scoped_release unlocked;
-  dynamics::Workspace ws(bound.model);
-  for (py::ssize_t i = 0; i < count; ++i) f(ws, i, y + i * size);
-  return out;
+py::array_t<double> call_with_wrenches(BoundModel& bound, const States& in, const F& f) {
+  std::array<Eigen::VectorXd, 3> x;
+  for (auto& each : x) each.resize(in.dof());
+  return for_each_state(bound, in, {in.dof()}, [&, x](auto& ws, py::ssize_t i, double* y) mutable {
+    f(ws, in.row(0, i, x[0]), in.row(1, i, x[1]), in.row(2, i, x[2]),
+      Eigen::Map<Eigen::VectorXd>(y, in.dof()));
+  });
 }
 
-py::array_t<double> rnea(BoundModel& bound, py::handle q, py::handle v, py::handle a) {
+py::array_t<double> rnea(BoundModel& bound, py::handle q, py::handle v, py::handle a,
+                         py::handle wrenches) {
+  const auto given = wrenches_of("rnea", wrenches);
   States in("rnea", bound.model.dof());
   in.add("q", q);
   in.add("v", v);
   in.add("a", a);
+  if (!given.empty())
+    return call_with_wrenches(
+        bound, in, [&](auto& ws, const auto& x, const auto& y, const auto& z, auto&& out) {
+          dynamics::inverse_dynamics(bound.model, ws, x, y, z, given, out);
+        });
   return call_in_lanes(
       bound, in,
       [&](auto& ws, const auto& x, const auto& y, const auto& z, auto& out) {
@@ -184,11 +104,18 @@ py::array_t<double> rnea(BoundModel& bound, py::handle q, py::handle v, py::hand
       });
 }
 
-py::array_t<double> aba(BoundModel& bound, py::handle q, py::handle v, py::handle tau) {
+py::array_t<double> aba(BoundModel& bound, py::handle q, py::handle v, py::handle tau,
+                        py::handle wrenches) {
+  const auto given = wrenches_of("aba", wrenches);
   States in("aba", bound.model.dof());
   in.add("q", q);
   in.add("v", v);
   in.add("tau", tau);
+  if (!given.empty())
+    return call_with_wrenches(
+        bound, in, [&](auto& ws, const auto& x, const auto& y, const auto& z, auto&& out) {
+          dynamics::forward_dynamics(bound.model, ws, x, y, z, given, out);
+        });
   return call_in_lanes(
       bound, in,
       [&](auto& ws, const auto& x, const auto& y, const auto& z, auto& out) {
@@ -268,95 +195,6 @@ py::object potential_energy(BoundModel& bound, py::handle q) {
   return energies(bound, in, [&](auto& ws, py::ssize_t i) {
     return dynamics::potential_energy(bound.model, ws, in.row(0, i, x));
   });
-}
-
-void write_pose(const geometry::SE3& pose, double* out) {
-  Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> matrix(out);
-  matrix = pose.matrix();
-}
-
-py::array_t<double> forward_kinematics(BoundModel& bound, py::handle q) {
-  const py::ssize_t dof = bound.model.dof();
-  States in("forward_kinematics", dof);
-  in.add("q", q);
-  return for_each_state(bound, in, {dof, 4, 4},
-                        [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
-                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-                          for (int link = 0; link < dof; ++link)
-                            write_pose(dynamics::link_pose(bound.model, ws, link), y + 16 * link);
-                        });
-}
-
-py::array_t<double> tip_pose(BoundModel& bound, py::handle q) {
-  const py::ssize_t dof = bound.model.dof();
-  States in("tip_pose", dof);
-  in.add("q", q);
-  return for_each_state(bound, in, {4, 4},
-                        [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
-                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-                          write_pose(dynamics::tip_pose(bound.model, ws), y);
-                        });
-}
-
-// None: the tip's link; else an index or a name.
-std::optional<int> link_of(const char* function, const model::Model& model, py::handle link) {
-  if (link.is_none()) return std::nullopt;
-  const auto& links = model.robot().links;
-  if (PyUnicode_Check(link.ptr()) != 0) {
-    const auto name = link.cast<std::string>();
-    std::vector<std::string> names;
-    for (std::size_t i = 0; i < links.size(); ++i) {
-      if (links[i].name == name) return static_cast<int>(i);
-      names.push_back(links[i].name);
-    }
-    refuse(function, "link",
-           fmt::format("'{}' is not a moving link, expected one of {}{}", name,
-                       fmt::join(names, ", "), did_you_mean(name, names)));
-  }
-  if (PyIndex_Check(link.ptr()) == 0)
-    throw py::type_error(fmt::format("{}: link: expected a name, an index or None", function));
-  const py::ssize_t index = PyNumber_AsSsize_t(link.ptr(), PyExc_IndexError);
-  if (index == -1 && PyErr_Occurred() != nullptr) throw py::error_already_set();
-  if (index < 0 || index >= static_cast<py::ssize_t>(links.size()))
-    refuse(function, "link", fmt::format("{}, expected 0 to {}", index, links.size() - 1));
-  return static_cast<int>(index);
-}
-
-py::array_t<double> jacobian(BoundModel& bound, py::handle q, py::handle link, py::handle point) {
-  const py::ssize_t dof = bound.model.dof();
-  const auto chosen = link_of("jacobian", bound.model, link);
-  const int index = chosen.value_or(bound.model.robot().tip.link);
-  std::optional<Eigen::Vector3d> in_link;
-  if (!point.is_none()) in_link = vector3_of("jacobian", "point", point);
-  States in("jacobian", dof);
-  in.add("q", q);
-  return for_each_state(bound, in, {6, dof},
-                        [&, x = Eigen::VectorXd(dof), J = dynamics::Matrix6Xd(6, dof)](
-                            auto& ws, py::ssize_t i, double* y) mutable {
-                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-                          const Eigen::Vector3d at =
-                              in_link  ? dynamics::point_position(bound.model, ws, index, *in_link)
-                              : chosen ? dynamics::link_pose(bound.model, ws, index).p()
-                                       : dynamics::tip_pose(bound.model, ws).p();
-                          dynamics::frame_jacobian(bound.model, ws, index, at, J);
-                          Eigen::Map<RowMatrix>(y, 6, dof) = J;
-                        });
-}
-
-py::array_t<double> shape_centers(BoundModel& bound, py::handle q) {
-  const py::ssize_t dof = bound.model.dof();
-  States in("shape_centers", dof);
-  in.add("q", q);
-  const auto count = static_cast<py::ssize_t>(bound.model.shapes().size());
-  return for_each_state(bound, in, {count, 3},
-                        [&, x = Eigen::VectorXd(dof),
-                         centers = std::vector<Eigen::Vector3d>(bound.model.shapes().size())](
-                            auto& ws, py::ssize_t i, double* y) mutable {
-                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-                          dynamics::shape_centers(bound.model, ws, centers);
-                          for (std::size_t s = 0; s < centers.size(); ++s)
-                            Eigen::Map<Eigen::Vector3d>(y + 3 * s) = centers[s];
-                        });
 }
 
 py::array_t<double> per_joint(const BoundModel& bound, std::optional<double> model::Joint::*member,
@@ -528,13 +366,16 @@ void add_properties(py::class_<BoundModel, SharedModel>& type) {
 
 void add_dynamics(py::class_<BoundModel, SharedModel>& type) {
   using py::arg;
-  type.def("rnea", &rnea, arg("q"), arg("v"), arg("a"),
+  type.def("rnea", &rnea, arg("q"), arg("v"), arg("a"), py::kw_only(), arg("wrenches") = py::none(),
            "Inverse dynamics: tau = M(q) a + C(q, v) v + dU(q) [Nm or N].\n\n"
+           "wrenches: of the surroundings, as wrench() makes them; the joints exert less by\n"
+           "external_torque(q, wrenches).\n"
            "q, v, a: shape (n,), or (N, n) for N states in SIMD lanes. Returns the same shape.\n"
            "Arrays (N, n) in Fortran order are used in place; arrays in C order are transposed\n"
            "block by block.")
-      .def("aba", &aba, arg("q"), arg("v"), arg("tau"),
+      .def("aba", &aba, arg("q"), arg("v"), arg("tau"), py::kw_only(), arg("wrenches") = py::none(),
            "Forward dynamics: the acceleration a with rnea(q, v, a) = tau [rad/s^2 or m/s^2].\n\n"
+           "wrenches: as in rnea.\n"
            "q, v, tau: shape (n,), or (N, n) for N states in SIMD lanes, as in rnea. Returns the\n"
            "same shape.")
       .def("crba", &crba, arg("q"),
@@ -566,17 +407,7 @@ void add_dynamics(py::class_<BoundModel, SharedModel>& type) {
       .def("kinetic_energy", &kinetic_energy, arg("q"), arg("v"),
            "Kinetic energy [J]: a number, or shape (N,) for N states.")
       .def("potential_energy", &potential_energy, arg("q"),
-           "Potential energy of gravity [J]: a number, or shape (N,) for N states.")
-      .def("forward_kinematics", &forward_kinematics, arg("q"),
-           "World poses of the links' centre-of-mass frames, shape (n, 4, 4) or (N, n, 4, 4).")
-      .def("tip_pose", &tip_pose, arg("q"), "World pose of the tip, shape (4, 4) or (N, 4, 4).")
-      .def("jacobian", &jacobian, arg("q"), arg("link") = py::none(), arg("point") = py::none(),
-           "Jacobian of a point: shape (6, n) or (N, 6, n), angular rows first, world axes.\n\n"
-           "link: name or index of a moving link; None: the link of the tip.\n"
-           "point: shape (3,), in the link's centre-of-mass frame [m]; None: that frame's origin,\n"
-           "or the tip if no link is given.")
-      .def("shape_centers", &shape_centers, arg("q"),
-           "World centres of all collision shapes, shape (S, 3) or (N, S, 3) [m].");
+           "Potential energy of gravity [J]: a number, or shape (N,) for N states.");
 }
 
 }  // namespace
@@ -595,6 +426,9 @@ void add_models(py::module_& module) {
            "gravity: shape (3,) [m/s^2]; None: (0, 0, -9.81).");
   add_properties(type);
   add_dynamics(type);
+  add_derivatives(type);
+  add_kinematics(type);
+  add_wrenches(module, type);
   type.def(
           "to_dict",
           [](const BoundModel& m) {

@@ -311,7 +311,8 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
       row[kinetic] + row[potential] + row[control] -
       (row[gyroscopic] + row[held] - row[dissipated] + row[node]) -
       (energy.contains("stop_work_J") ? number(energy, "stop_work_J", reader) : 0.0) -
-      (energy.contains("load_energy_J") ? number(energy, "load_energy_J", reader) : 0.0);
+      (energy.contains("load_energy_J") ? number(energy, "load_energy_J", reader) : 0.0) -
+      (energy.contains("external_work_J") ? number(energy, "external_work_J", reader) : 0.0);
   if (ticks_ == 0) first_balance_ = balance;
   row[energy_error] = std::abs(balance - first_balance_);
   row[updates] = number(solver, "updates", reader);

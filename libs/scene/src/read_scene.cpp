@@ -457,6 +457,29 @@ std::vector<Event> read_events(const Reader& in, const std::filesystem::path& fo
   return out;
 }
 
+std::vector<WrenchSpec> read_wrenches(const Reader& in) {
+  using dynamics::Reference;
+  std::vector<WrenchSpec> out;
+  in.each("wrenches", [&](const Reader& given) {
+    WrenchSpec wrench;
+    wrench.frame = given.get<std::string>("frame", "");
+    wrench.reference =
+        dynamics::reference_named(given.get<std::string>("reference", "local_world_aligned"))
+            .value_or(Reference::local_world_aligned);
+    wrench.force_N = given.vector("force_N", wrench.force_N);
+    wrench.moment_Nm = given.vector("moment_Nm", wrench.moment_Nm);
+    if (given.find("force_N") == nullptr && given.find("moment_Nm") == nullptr)
+      given.fail("force_N", "is missing, expected force_N, moment_Nm or both");
+    wrench.from_s = given.get("from_s", 0.0);
+    wrench.to_s = given.maybe<double>("to_s");
+    if (wrench.to_s && !(*wrench.to_s > wrench.from_s))
+      given.fail("to_s",
+                 fmt::format("is {}, expected more than from_s, {}", *wrench.to_s, wrench.from_s));
+    out.push_back(std::move(wrench));
+  });
+  return out;
+}
+
 GuideSpec read_guide(const Reader& planner) {
   GuideSpec guide;
   guide.type =
@@ -526,6 +549,7 @@ Scene parts_from_json(const Json& document, const std::filesystem::path& base_di
   scene.plant = read_plant(in, in.child("plant"), scene.actuation.type);
   scene.safety = read_safety(in.child("safety"));
   scene.events = read_events(in, base_dir, scene);
+  scene.wrenches = read_wrenches(in);
   return scene;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "hamelin/scene/self_collision.hpp"
 
@@ -47,6 +48,12 @@ Json robot_info(const model::Model& model) {
          {"capsules", capsules_of(link)},
          {"lines", link.segments.size() - capsules_of(link)}});
   }
+  Json frames = Json::array();
+  for (const auto& frame : model.frames())
+    frames.push_back(
+        {{"name", frame.name},
+         {"link", frame.link < 0 ? Json(nullptr)
+                                 : Json(robot.links[static_cast<std::size_t>(frame.link)].name)}});
   const SelfField self(model);
   Json notes = robot.notes;
   if (!self.note().empty()) notes.push_back(self.note());
@@ -55,6 +62,7 @@ Json robot_info(const model::Model& model) {
           {"planar", model.planar()},
           {"tip", robot.tip.name},
           {"tip_link", robot.links[static_cast<std::size_t>(robot.tip.link)].name},
+          {"frames", std::move(frames)},
           {"mass_kg", mass},
           {"reach_m", model.reach()},
           {"spheres", count_shapes(model, false)},

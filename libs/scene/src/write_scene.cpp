@@ -104,6 +104,15 @@ Json payload_json(const Payload& payload) {
   return out;
 }
 
+Json wrench_json(const WrenchSpec& wrench) {
+  return {{"frame", wrench.frame.empty() ? Json(nullptr) : Json(wrench.frame)},
+          {"reference", dynamics::name_of(wrench.reference)},
+          {"force_N", array(wrench.force_N)},
+          {"moment_Nm", array(wrench.moment_Nm)},
+          {"from_s", wrench.from_s},
+          {"to_s", or_null(wrench.to_s)}};
+}
+
 Json event_json(const Event& event) {
   Json out = Json::object();
   if (event.time_s) out["time_s"] = *event.time_s;
@@ -323,6 +332,7 @@ Json resolved_json(const Scene& scene) {
   out["sensors"] = Json::array();
   for (const SensorSpec& sensor : scene.sensors) out["sensors"].push_back(sensor_json(sensor));
   for (const Event& event : scene.events) out["events"].push_back(event_json(event));
+  for (const WrenchSpec& wrench : scene.wrenches) out["wrenches"].push_back(wrench_json(wrench));
   out["model"] = model_json(scene.model);
   out["actuation"] = actuation_json(scene.actuation);
   if (scene.plant != PlantType::hamelin) out["plant"] = {{"type", to_string(scene.plant)}};

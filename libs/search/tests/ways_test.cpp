@@ -101,7 +101,8 @@ TEST_CASE("an arc passes its three points at constant speed", "[search][ways]") 
     CHECK(bend == Approx(arc.bend_m()).epsilon(1e-4));
   }
   CHECK_THAT(test::error_of([] {
-               (void)TipCurve::arc({}, Vector3d(1, 0, 0), {{}, Vector3d(2, 0, 0)});
+               (void)TipCurve::arc({}, Vector3d(1, 0, 0),
+                                   {Eigen::Matrix3d::Identity(), Vector3d(2, 0, 0)});
              }),
              Contains("arc: its ends and the point between them are on a line"));
 }
@@ -223,7 +224,7 @@ TEST_CASE("a path leads to any of several goals, and says which and why not to o
   VectorXd blocked = rig.start, clear = rig.start;
   blocked[0] += 0.8;
   clear[0] -= 1.0;
-  scene::Goal far = scene::pose_goal({{}, Vector3d(50.0, 0.0, 0.0)});
+  scene::Goal far = scene::pose_goal({Eigen::Matrix3d::Identity(), Vector3d(50.0, 0.0, 0.0)});
   scene::Goal near = scene::pose_goal(rig.tip(clear));
   test::JointSpaceWorld world({{blocked, 0.3}});
   search::Problem problem{rig.start, {scene::joint_goal(blocked), far, near}};

@@ -245,7 +245,14 @@ void ClosedLoop::write_tick() {
     log_->tick(judge_->certified(), done_ ? nullptr : controller_->answer().channels);
 }
 
+void ClosedLoop::push_arm() {
+  if (!wrenches_ || !wrenches_->advance(plant_->node().time_s)) return;
+  plant_->push(wrenches_->active());
+  report_event(false, wrenches_->describe());
+}
+
 void ClosedLoop::step() {
+  push_arm();
   judge_->depart(actuation_->departure_velocity());
   if (actuation_->saturated()) ++saturated_steps_;
   const bool converged = actuation_->step(scene_.step_s);

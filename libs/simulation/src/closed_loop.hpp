@@ -19,6 +19,7 @@
 #include "tick_log.hpp"
 #include "tracking_audit.hpp"
 #include "trajectory_audit.hpp"
+#include "wrench_feed.hpp"
 
 namespace hamelin::simulation {
 
@@ -117,6 +118,8 @@ class ClosedLoop {
   /// Books the last node with the answer that was made for it, if there is one.
   void book_answer();
   void write_tick();
+  /// Lets the wrenches act that are due at this node.
+  void push_arm();
   void step();
 
   void finish(log::Outcome outcome, std::string cause);
@@ -134,7 +137,8 @@ class ClosedLoop {
   log::Result result_;
   std::unique_ptr<control::Controller> controller_;
   std::unique_ptr<Judge> judge_;
-  std::unique_ptr<SensorFeed> sensors_;  ///< null if the scene has none
+  std::unique_ptr<SensorFeed> sensors_;   ///< null if the scene has none
+  std::unique_ptr<WrenchFeed> wrenches_;  ///< as `sensors_`
   std::unique_ptr<Actuation> actuation_;
   Eigen::VectorXd q_shown_, v_shown_;  ///< to the controller
 
@@ -158,12 +162,12 @@ class ClosedLoop {
   bool halting_ = false;        ///< whether the run ends when the shield's stop does
   long saturated_steps_ = 0;
   std::size_t next_map_change_ = 0, goals_reached_ = 0, next_event_ = 0;
-  model::Model bare_;                    ///< the arm without what events attach to it
-  std::vector<scene::Payload> carried_;  ///< attached by events
+  model::Model bare_;                            ///< the arm without what events attach to it
+  std::vector<scene::Payload> carried_;          ///< attached by events
   std::map<std::size_t, geometry::SE3> in_tip_;  ///< poses of obstacles that were attached
-  std::uint64_t expected_load_ = 0;      ///< of the event that has begun; 0: none has
-  long observed_k_ = -1;                 ///< the step at which the controller last looked
-  double observing_s_ = 0.0;             ///< that this took
+  std::uint64_t expected_load_ = 0;              ///< of the event that has begun; 0: none has
+  long observed_k_ = -1;                         ///< the step at which the controller last looked
+  double observing_s_ = 0.0;                     ///< that this took
 };
 
 }  // namespace hamelin::simulation

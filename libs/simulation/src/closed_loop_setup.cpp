@@ -85,6 +85,8 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   if (const control::WorldView& view = judge_->view();
       view.has_self() && !view.self_field()->note().empty())
     result_.warnings.push_back(view.self_field()->note());
+  if (!scene.wrenches.empty())
+    wrenches_ = std::make_unique<WrenchFeed>(scene.wrenches, model_, scene.name + ": /wrenches");
   if (!scene.sensors.empty()) sensors_ = std::make_unique<SensorFeed>(scene, model_);
   inputs_ = all_inputs(scene, plugin, planner_params_);
 }

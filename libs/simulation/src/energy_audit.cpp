@@ -25,7 +25,7 @@ void EnergyAudit::book_node(long k, const integration::Energy& energy, double co
   const Ledger& last = recorder_.last_node();
   if (k > 0)
     for (const auto account : {&Ledger::kinetic, &Ledger::potential, &Ledger::held, &Ledger::stop,
-                               &Ledger::dissipated, &Ledger::node})
+                               &Ledger::dissipated, &Ledger::node, &Ledger::external})
       exchanged_J_ += std::abs(ledger_.*account - last.*account);
   recorder_.node(ledger_);
 }

@@ -10,6 +10,7 @@
 #include "hamelin/simulation/integrator_options.hpp"
 #include "recorder.hpp"
 #include "scene_values.hpp"
+#include "wrench_feed.hpp"
 
 namespace hamelin::simulation {
 
@@ -34,6 +35,7 @@ FreeMotion free_motion(const scene::Scene& given, const model::Model& model) {
   motion.damping = plant_damping(scene, model.robot());
   motion.coulomb = plant_friction(scene, model.robot());
   motion.coulomb_speed = scene.model.friction_speed;
+  motion.wrenches = scene.wrenches;
   motion.config = resolved_config(scene);
   motion.inputs = inputs_of(scene);
   return motion;
@@ -89,6 +91,7 @@ class FreeRun {
   log::Result result_;
   Recorder recorder_;
   integration::Channels channels_;
+  std::unique_ptr<WrenchFeed> wrenches_;  ///< null: there are none
   integration::State state_;
   integration::StepReport report_;
   Eigen::VectorXd v_;
@@ -109,6 +112,8 @@ FreeRun::FreeRun(const model::Model& model, const FreeMotion& motion, const Watc
   channels_.damping = motion.damping;
   channels_.coulomb = motion.coulomb;
   channels_.coulomb_speed = motion.coulomb_speed;
+  if (!motion.wrenches.empty())
+    wrenches_ = std::make_unique<WrenchFeed>(motion.wrenches, model, motion.name + ": /wrenches");
   if (controlled_) state_.step_next = motion.step_s;
   report_.step_s = motion.step_s;  // for the observation of the first node
   write_header(watch);
@@ -158,6 +163,7 @@ void FreeRun::log_tick() {
 }
 
 bool FreeRun::step() {
+  if (wrenches_ && wrenches_->advance(state_.time_s)) channels_.wrenches = wrenches_->active();
   const double left = motion_.duration_s - state_.time_s;
   report_ = controlled_ ? integrator_->advance(state_, channels_, left)
                         : integrator_->step(state_, channels_, motion_.step_s);

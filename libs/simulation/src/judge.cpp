@@ -18,7 +18,7 @@ bool controller_sees_all(const scene::Scene& scene) {
   const bool exact =
       scene.actuation.joint_noise_rad == 0.0 && scene.actuation.planner_mass_scale == 1.0 &&
       !scene.actuation.estimates_velocity && scene.actuation.type != scene::ActuationType::position;
-  return exact && scene.events.empty() && scene.sensors.empty() &&
+  return exact && scene.events.empty() && scene.wrenches.empty() && scene.sensors.empty() &&
          !(scene.map && !scene.map->changes.empty()) &&
          std::all_of(scene.obstacles.begin(), scene.obstacles.end(),
                      [](const auto& o) { return o.known && !o.judge_only; }) &&

@@ -135,6 +135,7 @@ void Recorder::close(const Ledger& ledger) {
   result_.gyroscopic_work_J = ledger.gyroscopic;
   result_.held_work_J = ledger.held;
   result_.dissipated_J = ledger.dissipated;
+  result_.external_work_J = ledger.external;
   result_.node_work_J = ledger.node;
   result_.filter_work_J = ledger.filter;
   result_.recovery_work_J = ledger.recovery;
@@ -164,6 +165,7 @@ Json energy_json(const Ledger& ledger) {
            {"node_work_J", ledger.node}};
   if (ledger.stop != 0.0) out["stop_work_J"] = ledger.stop;
   if (ledger.load != 0.0) out["load_energy_J"] = ledger.load;
+  if (ledger.external != 0.0) out["external_work_J"] = ledger.external;
   return out;
 }
 

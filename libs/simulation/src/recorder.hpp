@@ -26,14 +26,17 @@ struct Ledger {
   double node = 0.0;                    ///< of node velocities: law, filter and recovery together
   double filter = 0.0, recovery = 0.0;  ///< parts of `node`, by the planner's account
   double load = 0.0;                    ///< that came with attached objects
+  double external = 0.0;                ///< of the surroundings' wrenches
 
   void book(const integration::StepReport& report, bool stopping) noexcept {
     gyroscopic += report.gyroscopic_work_J;
     (stopping ? stop : held) += report.held_work_J;
     dissipated += report.dissipated_J;
+    external += report.external_work_J;
   }
   [[nodiscard]] double balance() const noexcept {
-    return kinetic + potential + control - (gyroscopic + held + stop - dissipated + node + load);
+    return kinetic + potential + control -
+           (gyroscopic + held + stop - dissipated + node + load + external);
   }
 };
 

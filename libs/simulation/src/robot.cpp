@@ -28,6 +28,11 @@ const scene::Scene& checked(const scene::Scene& scene) {
                 fmt::format("{}: /events: has {} events, expected none, because only `hamelin run` "
                             "simulates them",
                             scene.name, scene.events.size()));
+  if (!scene.wrenches.empty())
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: /wrenches: has {} wrenches, expected none, because only `hamelin "
+                            "run` and `hamelin integrate` simulate them",
+                            scene.name, scene.wrenches.size()));
   return scene;
 }
 

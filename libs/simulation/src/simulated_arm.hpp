@@ -21,6 +21,9 @@ class SimulatedArm final : public Plant {
   void start(const Eigen::VectorXd& q, const Eigen::VectorXd& v) override;
   [[nodiscard]] bool step(const Eigen::VectorXd& torque, double step_s) override;
   void take_load() override;
+  void push(std::span<const dynamics::ExternalWrench> wrenches) override {
+    arm_.channels.wrenches.assign(wrenches.begin(), wrenches.end());
+  }
   [[nodiscard]] integration::Energy energy() override {
     return arm_.integrator->energy(arm_.state, node_.v);
   }

@@ -6,6 +6,13 @@
 
 namespace hamelin::integration::kernel {
 
+/// Joint torques of wrenches on the arm, computed outside of the kernels.
+struct ExternalTorque {
+  /// Null: there are none.
+  void (*evaluate)(void* context, const double* q, const double* v, double* tau) noexcept = nullptr;
+  void* context = nullptr;
+};
+
 /// The forces of a step's channels, docs/theory.md (8.2), in the form of the kernels. Null pointers
 /// and a count of zero mean that there are none.
 struct Forces {
@@ -13,11 +20,12 @@ struct Forces {
   double coulomb_speed;
   const dynamics::kernel::Spin* spins;
   std::size_t spin_count;
+  ExternalTorque external{};
 };
 
 /// The work of these forces in a step [J].
 struct Work {
-  double held, dissipated, gyroscopic;
+  double held, dissipated, gyroscopic, external;
 };
 
 inline namespace HAMELIN_ISA_NAMESPACE {

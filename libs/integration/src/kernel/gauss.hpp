@@ -114,8 +114,8 @@ class Gauss {
 
  public:
   static std::size_t bytes(std::size_t n, std::size_t stages) noexcept {
-    return (2 * GaussMemory::rows(Form, n) * groups(stages) + 6 * n) * sizeof(Pack) +
-           Scratch::alignment + Scratch::bytes(n);
+    return (2 * GaussMemory::rows(Form, n) * groups(stages) + 7 * n) * sizeof(Pack) +
+           3 * n * sizeof(double) + Scratch::alignment + Scratch::bytes(n);
   }
 
   static GaussOutcome step(const GaussCall<Chain>& call, void* memory) noexcept {
@@ -136,10 +136,12 @@ class Gauss {
         rate_(u_ + n_),
         force_(rate_ + 2 * n_),
         torque_(force_ + n_),
-        scratch_(Scratch::at(aligned(torque_ + n_), n_)) {}
+        external_(torque_ + n_),
+        lane_(reinterpret_cast<double*>(external_ + n_)),
+        scratch_(Scratch::at(aligned(lane_ + 3 * n_), n_)) {}
 
   static std::size_t groups(std::size_t stages) noexcept { return (stages + lanes - 1) / lanes; }
-  static void* aligned(Pack* p) noexcept {
+  static void* aligned(void* p) noexcept {
     auto address = reinterpret_cast<std::size_t>(p);
     address = (address + Scratch::alignment - 1) / Scratch::alignment * Scratch::alignment;
     return reinterpret_cast<void*>(address);
@@ -363,6 +365,24 @@ class Gauss {
                                                  force_);
       for (std::size_t r = 0; r < n_; ++r) torque[r] += force_[r];
     }
+    if (f.external.evaluate != nullptr) {
+      evaluate_external(v);
+      for (std::size_t r = 0; r < n_; ++r) torque[r] += external_[r];
+    }
+  }
+
+  /// The torques of the wrenches at q_ and the velocities v, lane by lane.
+  void evaluate_external(const Pack* v) noexcept {
+    const ExternalTorque& external = call_.forces.external;
+    double *const q = lane_, *const rate = q + n_, *const torque = rate + n_;
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      for (std::size_t r = 0; r < n_; ++r) {
+        q[r] = q_[r].v[lane];
+        rate[r] = v[r].v[lane];
+      }
+      external.evaluate(external.context, q, rate, torque);
+      for (std::size_t r = 0; r < n_; ++r) external_[r].v[lane] = torque[r];
+    }
   }
 
   void finish(GaussOutcome& out) noexcept {
@@ -411,19 +431,21 @@ class Gauss {
   /// The work of the forces, docs/theory.md (5.8), at the converged stages.
   void add_works(Work& work) noexcept {
     const Forces& f = call_.forces;
-    if (f.held == nullptr && f.damping == nullptr && f.coulomb == nullptr && f.spin_count == 0)
-      return;
+    const bool external = f.external.evaluate != nullptr, of_place = f.spin_count > 0 || external;
+    if (f.held == nullptr && f.damping == nullptr && f.coulomb == nullptr && !of_place) return;
     for (std::size_t g = 0; g < groups_; ++g) {
       const Pack* const v = of_momentum ? rate_ : u_;
-      if (f.spin_count > 0 || !of_momentum) place_stages(g);
-      if (f.spin_count > 0) rates();
-      if (f.spin_count == 0 && of_momentum)
+      if (of_place || !of_momentum) place_stages(g);
+      if (of_place) rates();
+      if (!of_place && of_momentum)
         for (std::size_t r = 0; r < n_; ++r) rate_[r] = increments_[r * groups_ + g] / weights(g);
       for (std::size_t lane = 0; lane < lanes && g * lanes + lane < s_; ++lane) {
         const double weight = call_.h * call_.tableau.b[g * lanes + lane];
         add_joint_work(f, n_, weight, work, [&](std::size_t r) { return v[r].v[lane]; });
         for (std::size_t r = 0; f.spin_count > 0 && r < n_; ++r)
           work.gyroscopic += weight * force_[r].v[lane] * v[r].v[lane];
+        for (std::size_t r = 0; external && r < n_; ++r)
+          work.external += weight * external_[r].v[lane] * v[r].v[lane];
       }
     }
   }
@@ -431,7 +453,8 @@ class Gauss {
   const GaussCall<Chain>& call_;
   std::size_t n_, rows_, s_, groups_;
   Pack *increments_, *guess_;  ///< rows × groups
-  Pack *q_, *u_, *rate_, *force_, *torque_;
+  Pack *q_, *u_, *rate_, *force_, *torque_, *external_;
+  double* lane_;  ///< one lane's positions, rates and external torques
   Scratch scratch_;
 };
 

@@ -127,7 +127,7 @@ class Variational {
 
  private:
   /// Places the chain at θ_mid and computes the twists ξ_i, b_i and the forces at the velocity Δ/h:
-  /// docs/theory.md (4.3), (4.9).
+  /// docs/theory.md (4.3), (4.9), (4.35).
   HAMELIN_INLINE void update_kinematics() noexcept {
     const double inv_h = 1.0 / call_.h;
     for (std::size_t i = 0; i < n_; ++i) {
@@ -147,6 +147,10 @@ class Variational {
     for (std::size_t i = 0; i < n_; ++i) force_[i] = joint_force(f, i, rate_[i]);
     if (f.spin_count > 0) {
       dynamics::kernel::gyroscopic_torque<Space>(call_.chain, k_, f.spins, f.spin_count, sigma_);
+      for (std::size_t i = 0; i < n_; ++i) force_[i] += sigma_[i];
+    }
+    if (f.external.evaluate != nullptr) {
+      f.external.evaluate(f.external.context, mid_, rate_, sigma_);
       for (std::size_t i = 0; i < n_; ++i) force_[i] += sigma_[i];
     }
   }
@@ -312,6 +316,7 @@ class Variational {
       out_.residual = first;
       if (!corrections.record(first)) return;
       if (call_.accept_unconfirmed && call_.forces.spin_count == 0 &&
+          call_.forces.external.evaluate == nullptr &&
           quadratic_constant * first * first <= call_.tolerance) {
         out_.residual = quadratic_constant * first * first;
         update_momentum();
@@ -345,6 +350,10 @@ class Variational {
     if (f.spin_count > 0) {
       dynamics::kernel::gyroscopic_torque<Space>(call_.chain, k_, f.spins, f.spin_count, sigma_);
       for (std::size_t i = 0; i < n_; ++i) out_.work.gyroscopic += sigma_[i] * rate_[i] * call_.h;
+    }
+    if (f.external.evaluate != nullptr) {
+      f.external.evaluate(f.external.context, mid_, rate_, sigma_);
+      for (std::size_t i = 0; i < n_; ++i) out_.work.external += sigma_[i] * rate_[i] * call_.h;
     }
   }
 

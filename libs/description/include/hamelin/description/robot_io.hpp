@@ -10,7 +10,8 @@ namespace hamelin::description {
 
 /// Choices that a robot file leaves to its reader.
 struct RobotOptions {
-  /// Name of the tip. URDF: any link, by default the only leaf. JSON: must be the file's own tip.
+  /// Name of the tip. URDF: any link, by default the only leaf. JSON: the file's tip, or one of its
+  /// frames on a moving link.
   std::optional<std::string> tip;
   /// Sidecar, a JSON file with collision shapes that replace those of the robot file. "links" maps
   /// names of links to spheres, [{"center": [x, y, z], "radius": r}, ...]; the optional "capsules"

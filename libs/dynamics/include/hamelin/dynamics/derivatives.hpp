@@ -30,8 +30,9 @@ class DerivativesWorkspace {
 
   Workspace ws;
   const DerivativeKernels* kernels;
-  AlignedBuffer sweep;     ///< scratch of the kernels
-  AlignedBuffer matrices;  ///< five, with the kernels' leading dimension
+  AlignedBuffer sweep;       ///< scratch of the kernels
+  AlignedBuffer matrices;    ///< five, with the kernels' leading dimension
+  Eigen::MatrixXd external;  ///< derivative of the torques of external wrenches
   std::vector<kernel::DerivativeLink> links;
   std::vector<kernel::DerivativeFrame> frames;
 };

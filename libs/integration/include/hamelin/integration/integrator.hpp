@@ -1,18 +1,21 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/dynamics/wrenches.hpp"
 #include "hamelin/integration/options.hpp"
 #include "hamelin/integration/step_history.hpp"
 
 namespace hamelin::integration {
 
 using dynamics::ConstVectorRef;
+using dynamics::ExternalWrench;
 using dynamics::GyroscopicTerm;
 using dynamics::VectorRef;
 using Eigen::VectorXd;
@@ -33,10 +36,18 @@ struct Channels {
   double coulomb_speed = 0.01;
   std::vector<GyroscopicTerm> gyroscopic;
   VectorXd held_torque;  ///< empty or dof [Nm]
+  /// Wrenches of the surroundings, held over the step in the terms of their references.
+  std::vector<ExternalWrench> wrenches;
+  /// If set, wrenches are functions of the state: wherever forces are evaluated, several times per
+  /// step, it sets their values at (q, v), for which ws has the poses. What it throws leaves
+  /// step(), and the state is then unchanged.
+  std::function<void(const dynamics::Workspace& ws, const VectorXd& q, const VectorXd& v,
+                     std::span<ExternalWrench> wrenches)>
+      wrench_law;
 
   [[nodiscard]] bool none() const noexcept {
     return damping.size() == 0 && coulomb.size() == 0 && gyroscopic.empty() &&
-           held_torque.size() == 0;
+           held_torque.size() == 0 && wrenches.empty();
   }
 };
 
@@ -49,6 +60,8 @@ struct StateOwner {
   std::uint64_t model = 0;   ///< Model::fingerprint
   friend bool operator==(const StateOwner&, const StateOwner&) = default;
 };
+
+class WrenchForces;
 
 /// The memory of an integrator between steps: a plain value to copy, keep and restore. Of v and p a
 /// state has the one that its scheme steps, and the other is empty; Integrator::velocity() works
@@ -81,6 +94,7 @@ struct StepReport {
   double gyroscopic_work_J = 0.0;  ///< this and the works below: docs/theory.md (8.5)
   double dissipated_J = 0.0;       ///< by damping and dry friction, positive
   double held_work_J = 0.0;        ///< by the held torque
+  double external_work_J = 0.0;    ///< by the wrenches
 };
 
 /// The report of two parts of a step, the second after the first.
@@ -104,7 +118,7 @@ struct Energy {
 /// doubles the momentum. What velocity() writes into a vector of the state changes the state.
 class Integrator {
  public:
-  virtual ~Integrator() = default;
+  virtual ~Integrator();
   Integrator(const Integrator&) = delete;
   Integrator& operator=(const Integrator&) = delete;
 
@@ -178,6 +192,8 @@ class Integrator {
   const Model& model_;
   const Settings settings_;
   mutable dynamics::Workspace ws_;
+  /// Of the current step; a scheme shares it with its parts.
+  std::shared_ptr<WrenchForces> wrenches_;
 
   /// Makes a constructed scheme ready: sets what its states are and allocates the memory that steps
   /// need. make_integrator() calls it; a scheme that is made without that calls it itself.

@@ -28,7 +28,7 @@ class StepDifferentiator {
   /// The derivatives of the last undivided step that led to a state. A step that was divided
   /// (StepReport::halvings) is several; StepDerivatives::step_s tells.
   /// @param after a state after a step of the scheme, with the options of this object
-  /// @param channels those of the step
+  /// @param channels those of the step, without a wrench law
   /// @param out made for as many joints; it cannot share memory with the other arguments
   /// @throws Error usage for sizes that do not fit, a state of another scheme or model
   ///         (StateOwner), or one that has not stepped since it was made or kicked or its velocity

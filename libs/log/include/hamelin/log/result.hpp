@@ -127,7 +127,8 @@ struct Result {
   SolverSummary solver;
   double gyroscopic_work_J = 0.0, filter_work_J = 0.0, recovery_work_J = 0.0, dissipated_J = 0.0,
          held_work_J = 0.0;
-  double node_work_J = 0.0;  ///< of node velocities: law, filter and recovery together
+  double external_work_J = 0.0;  ///< of the surroundings' wrenches
+  double node_work_J = 0.0;      ///< of node velocities: law, filter and recovery together
   std::optional<TorqueChange> torque_change;  ///< under sampled actuation
   std::optional<double> saturated_share;  ///< of all steps; null if torque limits are not modelled
   std::optional<double> certified_share;  ///< of all steps; null if nothing can be hit

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -52,7 +53,29 @@ class Model {
     return com_in_frame_[static_cast<std::size_t>(link)];
   }
   /// Pose of the tip in its link's joint-aligned frame (constant).
-  [[nodiscard]] const geometry::SE3& tip_in_frame() const noexcept { return tip_in_frame_; }
+  [[nodiscard]] const geometry::SE3& tip_in_frame() const noexcept {
+    return frames_.front().in_link;
+  }
+
+  /// A frame that has a name.
+  struct NamedFrame {
+    std::string name;
+    int link;               ///< that it moves with; −1: none
+    geometry::SE3 in_link;  ///< pose in the link's joint-aligned frame; without link, in the world
+  };
+  /// The tip, then Robot::frames.
+  [[nodiscard]] const std::vector<NamedFrame>& frames() const noexcept { return frames_; }
+  /// Index of the tip into frames().
+  static constexpr int tip_frame = 0;
+  /// Index into frames().
+  /// @throws Error usage for a name that no frame has, with the most similar one
+  [[nodiscard]] int frame(std::string_view name) const;
+  /// Index of a moving link.
+  /// @throws Error usage as frame()
+  [[nodiscard]] int link(std::string_view name) const;
+  /// Index of a joint, which is that of the link it moves.
+  /// @throws Error usage as frame()
+  [[nodiscard]] int joint(std::string_view name) const;
 
   /// A collision shape of a link: all points within `radius` of the segment from center − half_axis
   /// to center + half_axis.
@@ -100,7 +123,7 @@ class Model {
   geometry::SE3 root_;
   std::variant<SpatialChain, PlanarChain> chain_;
   std::vector<geometry::SE3> com_in_frame_;
-  geometry::SE3 tip_in_frame_;
+  std::vector<NamedFrame> frames_;
   std::vector<Shape> shapes_;
   bool has_capsules_ = false;
   double reach_ = 0.0;

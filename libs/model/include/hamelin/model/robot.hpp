@@ -60,10 +60,10 @@ struct Link {
   std::vector<Segment> segments;
 };
 
-/// The frame on a link that goals refer to.
-struct Tip {
+/// A frame that moves with a link.
+struct Frame {
   std::string name;
-  int link = 0;        ///< index of the link it moves with
+  int link = 0;        ///< index of the link it moves with; −1: it is fixed to the base
   geometry::SE3 pose;  ///< in the base frame at q = 0
 };
 
@@ -73,7 +73,10 @@ struct Tip {
 struct Robot {
   std::string name;
   std::vector<Link> links;
-  Tip tip;
+  Frame tip;  ///< that goals refer to; not on the base
+  /// The other frames that have a name: those of the links of the file, also of links that were
+  /// lumped into others or into the base.
+  std::vector<Frame> frames;
   /// Spheres of fixed links, in the base frame, each with its part; for self-collision only.
   std::vector<Sphere> base_spheres;
   std::vector<Segment> base_segments;  ///< as base_spheres; capsules only
@@ -88,9 +91,9 @@ struct Robot {
 /// Checks what every robot must satisfy: at least one link; parents before children and no
 /// branches; unit screws; for each joint, inertia about the joint in the links that it moves;
 /// symmetric inertias, with positive principal moments for every link with mass; finite numbers;
-/// lower < upper; each part on one body only; disabled pairs that name existing parts. Principal
-/// moments that break the triangle inequality pass, since the mass matrix is positive definite with
-/// them; readers warn about them.
+/// lower < upper; one frame of each name, the tip included; each part on one body only; disabled
+/// pairs that name existing parts. Principal moments that break the triangle inequality pass, since
+/// the mass matrix is positive definite with them; readers warn about them.
 /// @throws Error invalid: "where: link 'x': what is wrong, what was expected"
 void check(const Robot& robot, const std::string& where);
 

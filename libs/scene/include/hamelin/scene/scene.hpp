@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "hamelin/dynamics/frames.hpp"
 #include "hamelin/geometry/se3.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/model/model.hpp"
@@ -151,6 +152,15 @@ struct GuideSpec {
   double check_time_s = 2e-6;
 };
 
+/// A wrench of the surroundings on the arm during a run. Controllers do not know of it.
+struct WrenchSpec {
+  std::string frame;  ///< name; empty: the tip
+  dynamics::Reference reference = dynamics::Reference::local_world_aligned;
+  Eigen::Vector3d force_N = Eigen::Vector3d::Zero(), moment_Nm = Eigen::Vector3d::Zero();
+  double from_s = 0.0;
+  std::optional<double> to_s;  ///< none: up to the end
+};
+
 struct StallRule {
   double speed_m_s = 0.002, distance_m = 0.2, hold_s = 1.0;
 };
@@ -169,6 +179,7 @@ struct Scene {
   std::vector<Obstacle> obstacles;
   std::vector<SensorSpec> sensors;
   std::vector<Event> events;  ///< happen in this order
+  std::vector<WrenchSpec> wrenches;
   ModelFlags model;
   Actuation actuation;
   PlantType plant = PlantType::hamelin;

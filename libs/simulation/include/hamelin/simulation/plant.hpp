@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "hamelin/integration/integrator.hpp"
@@ -59,6 +60,8 @@ class Plant {
   virtual void change_obstacle(std::size_t /*index*/, const scene::Obstacle&) {}
   /// What contacts() does not count from now on.
   virtual void allow(const scene::Allowance&) {}
+  /// From this node on these wrenches act on the arm, and no others.
+  virtual void push(std::span<const dynamics::ExternalWrench> wrenches) = 0;
   /// Energy at the node.
   [[nodiscard]] virtual integration::Energy energy() = 0;
   [[nodiscard]] virtual Contacts contacts() const { return {}; }

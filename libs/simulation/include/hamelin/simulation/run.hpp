@@ -54,12 +54,13 @@ struct FreeMotion {
   Eigen::VectorXd damping;  ///< empty: none
   Eigen::VectorXd coulomb;  ///< dry friction, see integration::Channels; empty: none
   double coulomb_speed = scene::default_friction_speed;
+  std::vector<scene::WrenchSpec> wrenches;
   Json config = Json::object();    ///< a scene for the log's header, see free_motion()
   std::vector<log::Input> inputs;  ///< the files it was read from
 };
 
-/// The free motion of a scene: start, damping, step, duration, integrator. Planner, goals and
-/// obstacles are left out, also from its config.
+/// The free motion of a scene: start, damping, wrenches, step, duration, integrator. Planner, goals
+/// and obstacles are left out, also from its config.
 /// @throws Error invalid for integrator parameters or numbers that do not fit the robot
 [[nodiscard]] FreeMotion free_motion(const scene::Scene& scene, const model::Model& model);
 

@@ -81,6 +81,25 @@ class ReferenceDynamics {
     });
     return at;
   }
+  /// How a frame on a link moves: the twist [ω; v] of the link at the world's origin, and the
+  /// adjoint of the frame's world pose.
+  struct Motion {
+    Vector6c spatial;
+    Matrix6c Ad;
+  };
+  /// By products of exponentials. @param pose of the frame in the base frame at q = 0
+  [[nodiscard]] Motion motion(const VectorXc& q, const VectorXc& v, int link,
+                              const geometry::SE3& pose) const {
+    Motion out{Vector6c::Constant(C(0.0)), model_.base().Ad().cast<C>()};
+    for (int i = 0; i <= link; ++i) {
+      const auto& moved = model_.robot().links[static_cast<std::size_t>(i)];
+      const Vector6c screw = moved.joint.screw.template cast<C>();
+      out.spatial += out.Ad * screw * v[i];
+      out.Ad = (out.Ad * adjoint_of_exp(screw, q[i], turns(moved))).eval();
+    }
+    out.Ad = (out.Ad * pose.Ad().cast<C>()).eval();
+    return out;
+  }
 
  private:
   /// Calls f(i, R, p) with the world pose of each link's COM frame.
