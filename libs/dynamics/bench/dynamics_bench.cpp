@@ -2,9 +2,11 @@
 #include <Eigen/Geometry>
 
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "hamelin/dynamics/derivatives.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/dynamics/frame_batch.hpp"
 
 using namespace hamelin;
 using Eigen::VectorXd;
@@ -69,4 +71,44 @@ TEST_CASE("time of dynamics over the number of links", "[!benchmark][dynamics]")
       };
     }
   }
+}
+
+TEST_CASE("time of a pose and a Jacobian at many states", "[!benchmark][dynamics]") {
+  constexpr int n = 7, states = 100000, block = 128;
+  const model::Model model(chain(n, false));
+  const int tip = model::Model::tip_frame;
+  const auto reference = dynamics::Reference::local_world_aligned;
+  dynamics::StatesXd q(n, states), poses(12, states), jacobians(6 * n, states);
+  for (Eigen::Index s = 0; s < states; ++s)
+    for (Eigen::Index i = 0; i < n; ++i) q(i, s) = std::sin(0.1 * static_cast<double>(s * n + i));
+  const Eigen::MatrixXd columns = q;
+  BENCHMARK("100000 states, one by one") {
+    dynamics::Workspace ws(model);
+    dynamics::Matrix6Xd J(6, n);
+    double sum = 0.0;
+    for (Eigen::Index s = 0; s < states; ++s) {
+      dynamics::forward_kinematics(model, ws, columns.col(s));
+      dynamics::frame_jacobian(model, ws, tip, reference, J);
+      sum += dynamics::frame_pose(model, ws, tip).p().x() + J(0, 0);
+    }
+    return sum;
+  };
+  for (const int threads : {1, 2}) {
+    dynamics::FrameBatch batch(model, tip, {.threads = threads});
+    BENCHMARK(fmt::format("100000 states at once, {} threads", threads)) {
+      batch.evaluate(q, poses, jacobians);
+      return jacobians(0, 0);
+    };
+  }
+  dynamics::FrameBatch batch(model, tip);
+  dynamics::StatesXd some(n, block), block_poses(12, block), block_jacobians(6 * n, block);
+  BENCHMARK("100000 states, in blocks of 128 that stay in the cache") {
+    double sum = 0.0;
+    for (Eigen::Index s = 0; s + block <= states; s += block) {
+      some = q.middleCols(s, block);
+      batch.evaluate(some, block_poses, block_jacobians);
+      sum += block_poses(9, 0) + block_jacobians(0, 0);
+    }
+    return sum;
+  };
 }

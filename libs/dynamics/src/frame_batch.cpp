@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <thread>
 #include <variant>
 #include <vector>
 
@@ -36,13 +38,22 @@ BatchLink batch_link(const model::PlanarLink& l) {
           l.prismatic};
 }
 
+std::size_t checked_threads(int threads) {
+  if (threads < 1)
+    throw Error(ErrorCode::usage,
+                formatted("FrameBatch: {} threads given, expected at least 1", threads));
+  return static_cast<std::size_t>(threads);
+}
+
 }  // namespace
 
 struct FrameBatch::Data {
-  Data(const Model& model, int frame, Reference terms, Isa isa)
+  Data(const Model& model, int frame, const Settings& settings)
       : owner(model),
-        kernel(&select_frame_batch_set(isa)),
-        memory(kernel->bytes(static_cast<std::size_t>(model.dof()))) {
+        kernel(&select_frame_batch_set(settings.isa)),
+        bytes(kernel->bytes(static_cast<std::size_t>(model.dof()))),
+        memory(bytes * checked_threads(settings.threads)),
+        threads(static_cast<std::size_t>(settings.threads)) {
     const auto& named = named_frame("FrameBatch", model, frame);
     std::visit(
         [&](const auto& chain) {
@@ -53,32 +64,52 @@ struct FrameBatch::Data {
     call.moving = static_cast<std::size_t>(named.link + 1);
     call.root = batch_pose(model.root());
     call.frame = batch_pose(named.in_link);
-    call.local = terms == Reference::local;
-    call.about_origin = terms == Reference::world;
-    call.memory = memory.get();
+    call.local = settings.reference == Reference::local;
+    call.about_origin = settings.reference == Reference::world;
     call.links = links.data();
   }
   WorkspaceOwner owner;
+  // Of the states of a call, those of one thread.
+  void evaluate(std::size_t thread) noexcept {
+    constexpr std::size_t cache_line = 8;  // numbers that two threads should not share
+    const std::size_t all = (call.states + cache_line - 1) / cache_line,
+                      first = all * thread / threads * cache_line,
+                      end = std::min(call.states, all * (thread + 1) / threads * cache_line);
+    if (first >= end) return;
+    FrameBatchCall part = call;
+    part.memory = static_cast<std::byte*>(memory.get()) + thread * bytes;
+    part.states = end - first;
+    part.q += first;
+    if (part.poses != nullptr) part.poses += first;
+    if (part.jacobians != nullptr) part.jacobians += first;
+    kernel->evaluate(part);
+  }
+
   const FrameBatchKernel* kernel;
+  std::size_t bytes;  ///< of scratch memory per thread
   AlignedBuffer memory;
+  std::size_t threads;
   std::vector<BatchLink> links;
   FrameBatchCall call{};
 };
 
-FrameBatch::FrameBatch(const Model& model, int frame, Reference reference, Isa isa)
-    : data_(std::make_unique<Data>(model, frame, reference, isa)) {}
+FrameBatch::FrameBatch(const Model& model, int frame, const Settings& settings)
+    : data_(std::make_unique<Data>(model, frame, settings)) {}
 FrameBatch::FrameBatch(FrameBatch&&) noexcept = default;
 FrameBatch& FrameBatch::operator=(FrameBatch&&) noexcept = default;
 FrameBatch::~FrameBatch() = default;
 
-void FrameBatch::compute(const ConstStatesRef& q, double* poses, double* J) noexcept {
+void FrameBatch::compute(const ConstStatesRef& q, double* poses, double* J) {
   FrameBatchCall& call = data_->call;
   call.states = static_cast<std::size_t>(q.cols());
   call.stride = static_cast<std::size_t>(q.outerStride());
   call.q = q.data();
   call.poses = poses;
   call.jacobians = J;
-  data_->kernel->evaluate(call);
+  std::vector<std::jthread> others;
+  for (std::size_t thread = 1; thread < data_->threads; ++thread)
+    others.emplace_back([this, thread] { data_->evaluate(thread); });
+  data_->evaluate(0);
 }
 
 namespace {

@@ -53,7 +53,7 @@ TEST_CASE("poses and Jacobians of many states are those of one", "[dynamics][fra
       CAPTURE(c.seed, frame, static_cast<int>(reference), static_cast<int>(isa));
       const StatesXd q = random_states(rng, c.n, 1 + frame * 3);  // packets that are not full
       StatesXd poses(12, q.cols()), J(6 * c.n, q.cols());
-      FrameBatch batch(model, frame, reference, isa);
+      FrameBatch batch(model, frame, {.reference = reference, .isa = isa});
       batch.evaluate(q, poses, J);
       CHECK(difference(model, frame, reference, q, poses, J) <= 1e-13);
       StatesXd poses_alone(12, q.cols()), J_alone(6 * c.n, q.cols());
@@ -61,6 +61,11 @@ TEST_CASE("poses and Jacobians of many states are those of one", "[dynamics][fra
       batch.jacobians(q, J_alone);
       CHECK(poses_alone == poses);
       CHECK(J_alone == J);
+      StatesXd poses_shared(12, q.cols()), J_shared(6 * c.n, q.cols());
+      FrameBatch shared(model, frame, {.reference = reference, .isa = isa, .threads = 3});
+      shared.evaluate(q, poses_shared, J_shared);
+      CHECK(poses_shared == poses);
+      CHECK(J_shared == J);
     }
   }
 }
@@ -77,6 +82,7 @@ TEST_CASE("blocks of states that do not fit are refused, and nothing is allocate
   CHECK_THROWS_AS(batch.poses(q.leftCols(39).eval(), poses), Error);
   CHECK_THROWS_AS(batch.poses(poses, poses), Error);
   CHECK_THROWS_AS(FrameBatch(model, 99), Error);
+  CHECK_THROWS_AS(FrameBatch(model, 0, {.threads = 0}), Error);
   const StatesXd before = poses;
   batch.poses(q.leftCols(16), poses.leftCols(16));  // a block of both
   CHECK(poses.rightCols(24) == before.rightCols(24));

@@ -186,7 +186,7 @@ py::array_t<double> frame_jacobian(BoundModel& bound, py::handle q, py::handle f
                             Eigen::Map<RowMatrix>(y, 6, dof) = J;
                           });
   Blocks out(in, 6, dof);
-  dynamics::FrameBatch batch(bound.model, index, terms);
+  dynamics::FrameBatch batch(bound.model, index, {.reference = terms});
   in_blocks(
       in, 6 * dof, [&](const auto& at, auto&& J) { batch.jacobians(at, J); },
       [&](py::ssize_t first, py::ssize_t states, const double* numbers) {

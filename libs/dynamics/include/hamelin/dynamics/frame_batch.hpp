@@ -7,14 +7,22 @@ namespace hamelin::dynamics {
 
 struct FrameBatchKernel;
 
-/// Poses and Jacobians of one frame at many states, one state per lane of a SIMD register. One
-/// object serves one thread; nothing allocates after construction.
+/// Poses and Jacobians of one frame at many states, one state per lane of a SIMD register. An
+/// object serves one caller at a time. Large results are limited by memory: blocks of some hundred
+/// states stay in the cache.
 class FrameBatch {
  public:
-  /// @param frame an index into Model::frames() @param reference of the Jacobians
-  /// @throws Error usage for a frame that does not exist, or as Workspace
-  FrameBatch(const Model& model, int frame, Reference reference = Reference::local_world_aligned,
-             Isa isa = default_isa());
+  struct Settings {
+    Reference reference = Reference::local_world_aligned;  ///< of the Jacobians
+    Isa isa = default_isa();
+    /// Threads that share the states of a call, the caller's included. With one, nothing allocates
+    /// after construction. Results do not depend on it.
+    int threads = 1;
+  };
+  /// @param frame an index into Model::frames()
+  /// @throws Error usage for a frame that does not exist, less than one thread, or as Workspace
+  FrameBatch(const Model& model, int frame, const Settings& settings);
+  FrameBatch(const Model& model, int frame) : FrameBatch(model, frame, Settings()) {}
   FrameBatch(FrameBatch&&) noexcept;
   FrameBatch& operator=(FrameBatch&&) noexcept;
   ~FrameBatch();
@@ -33,7 +41,7 @@ class FrameBatch {
 
  private:
   struct Data;
-  void compute(const ConstStatesRef& q, double* poses, double* J) noexcept;
+  void compute(const ConstStatesRef& q, double* poses, double* J);
   std::unique_ptr<Data> data_;
 };
 
