@@ -264,13 +264,18 @@ void check_placement(const std::string& robot, const SE3& base, const Vector3d& 
 template <class List, class NameOf>
 int index_of(const char* what, std::string_view name, const std::string& robot, const List& list,
              const NameOf& name_of) {
+  constexpr std::size_t listed_max = 30;
+  for (std::size_t i = 0; i < list.size(); ++i)
+    if (name_of(list[i]) == name) return static_cast<int>(i);
   std::vector<std::string> names;
-  for (const auto& each : list) {
-    if (name_of(each) == name) return static_cast<int>(names.size());
-    names.push_back(name_of(each));
-  }
-  throw Error(ErrorCode::usage,
-              formatted("'{}' has no {} '{}'{}", robot, what, name, did_you_mean(name, names)));
+  for (const auto& each : list) names.push_back(name_of(each));
+  const std::string similar = did_you_mean(name, names);
+  const std::size_t more = names.size() - std::min(names.size(), listed_max);
+  names.resize(names.size() - more);
+  throw Error(
+      ErrorCode::usage,
+      formatted("'{}' has no {} '{}', expected one of {}{}{}", robot, what, name,
+                joined(names, ", "), more > 0 ? formatted(" and {} more", more) : "", similar));
 }
 
 }  // namespace

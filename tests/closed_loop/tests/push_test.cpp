@@ -53,7 +53,8 @@ TEST_CASE("a push of no length in another frame is refused, and one line says wh
   Json wrong = push;
   wrong["frame"] = "link44";
   CHECK_THAT(message(wrong), Catch::Contains("push.json: /wrenches/0/frame: ") &&
-                                 Catch::Contains("no frame 'link44'; did you mean 'link4'?"));
+                                 Catch::Contains("no frame 'link44', expected one of ") &&
+                                 Catch::Contains("; did you mean 'link4'?"));
   wrong = push;
   wrong["to_s"] = 0.1;
   CHECK_THAT(message(wrong),
