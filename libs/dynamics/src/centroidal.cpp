@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-#include "named_frames.hpp"
+#include "kinematics.hpp"
 
 namespace hamelin::dynamics {
 
@@ -25,9 +25,7 @@ struct Body {
     }
     const double share = other.mass / (mass + other.mass);
     const Vector3d apart = other.center - center;
-    inertia +=
-        other.inertia +
-        mass * share * (apart.squaredNorm() * Matrix3d::Identity() - apart * apart.transpose());
+    inertia += other.inertia + point_inertia(mass * share, apart);
     center += share * apart;
     mass += other.mass;
   }
@@ -35,8 +33,7 @@ struct Body {
 
 Body body_of(const Model& model, const Workspace& ws, int link) {
   const model::Link& given = model.robot().links[static_cast<std::size_t>(link)];
-  const Workspace::Frame& at = ws.frames[static_cast<std::size_t>(link)];
-  const geometry::SE3 com = geometry::SE3{at.R, at.p} * model.com_in_frame(link);
+  const geometry::SE3 com = link_pose(model, ws, link);
   return {given.mass_kg, com.p(), com.R() * given.inertia_kg_m2 * com.R().transpose()};
 }
 
@@ -65,16 +62,15 @@ Vector3d center_of_mass(const Model& model, const Workspace& ws) {
 Vector6d centroidal_momentum(const Model& model, const Workspace& ws, const ConstVectorRef& v) {
   detail::Call::with_poses("centroidal_momentum", model, ws.owner).joints("v", v);
   const Vector3d center = center_of_mass(model, ws);
-  Vector3d omega = Vector3d::Zero(), velocity = Vector3d::Zero(), angular = velocity,
-           linear = velocity;
+  Vector3d angular = Vector3d::Zero(), linear = Vector3d::Zero();
+  BodyMotion motion;
   for (int i = 0; i < model.dof(); ++i) {
-    const Workspace::Frame& at = ws.frames[static_cast<std::size_t>(i)];
-    if (i > 0) velocity += omega.cross(at.p - ws.frames[static_cast<std::size_t>(i - 1)].p);
-    (is_prismatic(model, i) ? velocity : omega) += at.axis * v[i];
+    motion.advance(model, ws, i, v[i], 0.0);
     const Body body = body_of(model, ws, i);
-    const Vector3d momentum = body.mass * (velocity + omega.cross(body.center - at.p));
+    const Vector3d from_origin = body.center - ws.frames[static_cast<std::size_t>(i)].p;
+    const Vector3d momentum = body.mass * (motion.velocity + motion.omega.cross(from_origin));
     linear += momentum;
-    angular += body.inertia * omega + (body.center - center).cross(momentum);
+    angular += body.inertia * motion.omega + (body.center - center).cross(momentum);
   }
   return (Vector6d() << angular, linear).finished();
 }

@@ -4,7 +4,7 @@
 
 #include "derivative_kernels.hpp"
 #include "hamelin/core/isa_kernels.hpp"
-#include "named_frames.hpp"
+#include "kinematics.hpp"
 
 namespace hamelin::dynamics {
 

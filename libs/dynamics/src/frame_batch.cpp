@@ -10,7 +10,7 @@
 
 #include "frame_batch_kernel.hpp"
 #include "hamelin/core/isa_kernels.hpp"
-#include "named_frames.hpp"
+#include "kinematics.hpp"
 
 namespace hamelin::dynamics {
 
@@ -68,7 +68,6 @@ struct FrameBatch::Data {
     call.about_origin = settings.reference == Reference::world;
     call.links = links.data();
   }
-  WorkspaceOwner owner;
   // Of the states of a call, those of one thread.
   void evaluate(std::size_t thread) noexcept {
     constexpr std::size_t cache_line = 8;  // numbers that two threads should not share
@@ -85,6 +84,7 @@ struct FrameBatch::Data {
     kernel->evaluate(part);
   }
 
+  WorkspaceOwner owner;
   const FrameBatchKernel* kernel;
   std::size_t bytes;  ///< of scratch memory per thread
   AlignedBuffer memory;
@@ -95,8 +95,6 @@ struct FrameBatch::Data {
 
 FrameBatch::FrameBatch(const Model& model, int frame, const Settings& settings)
     : data_(std::make_unique<Data>(model, frame, settings)) {}
-FrameBatch::FrameBatch(FrameBatch&&) noexcept = default;
-FrameBatch& FrameBatch::operator=(FrameBatch&&) noexcept = default;
 FrameBatch::~FrameBatch() = default;
 
 void FrameBatch::compute(const ConstStatesRef& q, double* poses, double* J) {

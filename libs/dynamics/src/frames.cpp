@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-#include "named_frames.hpp"
+#include "kinematics.hpp"
 
 namespace hamelin::dynamics {
 
@@ -17,46 +17,18 @@ const model::Model::NamedFrame& checked(const char* function, const Model& model
   return named_frame(function, model, frame);
 }
 
-// How a frame moves, by its origin, in world axes: docs/theory.md (2.34), (2.35).
-struct Motion {
-  Vector3d omega = Vector3d::Zero(), velocity = Vector3d::Zero();
-  Vector3d omega_rate = Vector3d::Zero(), acceleration = Vector3d::Zero();
-
-  // To another point of the same body.
-  void shift(const Vector3d& by) {
-    acceleration += omega_rate.cross(by) + omega.cross(omega.cross(by));
-    velocity += omega.cross(by);
-  }
-  void turn(const Vector3d& axis, double v, double a) {
-    omega_rate += axis * a + omega.cross(axis) * v;
-    omega += axis * v;
-  }
-  void slide(const Vector3d& axis, double v, double a) {
-    acceleration += axis * a + 2.0 * omega.cross(axis) * v;
-    velocity += axis * v;
-  }
-};
-
 // Of a body's point in the world.
 // @param a null: accelerations of zero
-Motion motion_of(const Model& model, const Workspace& ws, int link, const Vector3d& point,
-                 const double* v, const double* a) {
-  Motion motion;
-  for (int j = 0; j <= link; ++j) {
-    const Workspace::Frame& at = ws.frames[static_cast<std::size_t>(j)];
-    if (j > 0) motion.shift(at.p - ws.frames[static_cast<std::size_t>(j - 1)].p);
-    const double rate = a != nullptr ? a[j] : 0.0;
-    if (is_prismatic(model, j))
-      motion.slide(at.axis, v[j], rate);
-    else
-      motion.turn(at.axis, v[j], rate);
-  }
+BodyMotion motion_of(const Model& model, const Workspace& ws, int link, const Vector3d& point,
+                     const double* v, const double* a) {
+  BodyMotion motion;
+  for (int j = 0; j <= link; ++j) motion.advance(model, ws, j, v[j], a != nullptr ? a[j] : 0.0);
   motion.shift(point - ws.frames[static_cast<std::size_t>(link)].p);
   return motion;
 }
 
 // docs/theory.md (2.33)
-Vector6d twist_of(const Motion& motion, Reference reference, const SE3& pose) {
+Vector6d twist_of(const BodyMotion& motion, Reference reference, const SE3& pose) {
   Vector6d twist;
   switch (reference) {
     case Reference::world:
@@ -73,7 +45,7 @@ Vector6d twist_of(const Motion& motion, Reference reference, const SE3& pose) {
 }
 
 // docs/theory.md (2.36)
-Vector6d twist_rate_of(const Motion& motion, Reference reference, const SE3& pose) {
+Vector6d twist_rate_of(const BodyMotion& motion, Reference reference, const SE3& pose) {
   Vector6d rate;
   switch (reference) {
     case Reference::world:

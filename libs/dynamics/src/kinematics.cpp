@@ -7,7 +7,7 @@
 #include "hamelin/dynamics/kernel/planar.hpp"
 #include "hamelin/dynamics/kernel/spatial.hpp"
 #include "kernels.hpp"
-#include "named_frames.hpp"
+#include "kinematics.hpp"
 
 namespace hamelin::dynamics {
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <utility>
 
-#include "named_frames.hpp"
+#include "kinematics.hpp"
 
 namespace hamelin::dynamics {
 
@@ -18,12 +18,8 @@ using geometry::SE3;
 constexpr std::array<std::pair<int, int>, 6> entries{
     {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
 
-Matrix3d about_origin(double mass, const Vector3d& c) {
-  return mass * (c.squaredNorm() * Matrix3d::Identity() - c * c.transpose());
-}
-
-// How a link moves in a world that falls upwards, by the origin of its joint-aligned frame, in the
-// axes of that frame: (2.10).
+// How a link moves, by the origin of its joint-aligned frame, in the axes of that frame, where the
+// root accelerates against gravity: (2.10).
 struct Flow {
   Vector3d omega, rate, acceleration;
 };
@@ -60,7 +56,7 @@ VectorXd inertial_parameters(const Model& model) {
     const model::Link& link = model.robot().links[static_cast<std::size_t>(i)];
     const SE3& com = model.com_in_frame(i);
     const Matrix3d inertia =
-        com.R() * link.inertia_kg_m2 * com.R().transpose() + about_origin(link.mass_kg, com.p());
+        com.R() * link.inertia_kg_m2 * com.R().transpose() + point_inertia(link.mass_kg, com.p());
     auto part = out.segment<inertial_parameters_per_link>(inertial_parameters_per_link * i);
     part[0] = link.mass_kg;
     part.segment<3>(1) = link.mass_kg * com.p();
@@ -82,21 +78,14 @@ void inverse_dynamics_regressor(const Model& model, Workspace& ws, const ConstVe
       .size("Y (rows)", Y.rows(), ws.owner.dof)
       .size("Y (columns)", Y.cols(), per_link * ws.owner.dof);
   detail::forward_kinematics(model, ws, q.data());
-  Vector3d omega = Vector3d::Zero(), rate = Vector3d::Zero(), acceleration = -model.gravity();
+  BodyMotion motion;
+  motion.acceleration = -model.gravity();  // the root accelerates in place of weights
   for (int i = 0; i < model.dof(); ++i) {
+    motion.advance(model, ws, i, v[i], a[i]);
     const Workspace::Frame& at = ws.frames[static_cast<std::size_t>(i)];
-    if (i > 0) {
-      const Vector3d by = at.p - ws.frames[static_cast<std::size_t>(i - 1)].p;
-      acceleration += rate.cross(by) + omega.cross(omega.cross(by));
-    }
-    if (is_prismatic(model, i)) {
-      acceleration += at.axis * a[i] + 2.0 * omega.cross(at.axis) * v[i];
-    } else {
-      rate += at.axis * a[i] + omega.cross(at.axis) * v[i];
-      omega += at.axis * v[i];
-    }
-    Wrenches wrenches = wrenches_of(
-        {at.R.transpose() * omega, at.R.transpose() * rate, at.R.transpose() * acceleration});
+    Wrenches wrenches =
+        wrenches_of({at.R.transpose() * motion.omega, at.R.transpose() * motion.omega_rate,
+                     at.R.transpose() * motion.acceleration});
     wrenches.topRows<3>() = at.R * wrenches.topRows<3>();
     wrenches.bottomRows<3>() = at.R * wrenches.bottomRows<3>();
     for (int j = 0; j < model.dof(); ++j) {
@@ -130,7 +119,7 @@ model::Robot with_inertial_parameters(const Model& model, const VectorXd& parame
       const auto [row, column] = entries[static_cast<std::size_t>(k)];
       inertia(row, column) = inertia(column, row) = part[4 + k];
     }
-    inertia -= about_origin(mass, center);
+    inertia -= point_inertia(mass, center);
     const SE3 to_new(Matrix3d::Identity(), before.R().transpose() * (center - before.p()));
     for (model::Sphere& sphere : link.spheres) sphere.center_m -= to_new.p();
     for (model::Segment& segment : link.segments) {

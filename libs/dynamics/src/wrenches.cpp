@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-#include "named_frames.hpp"
+#include "kinematics.hpp"
 
 namespace hamelin::dynamics {
 

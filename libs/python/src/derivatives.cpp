@@ -77,16 +77,13 @@ py::array_t<double> regressor(BoundModel& bound, py::handle q, py::handle v, py:
   in.add("q", q);
   in.add("v", v);
   in.add("a", a);
-  std::array<Eigen::VectorXd, 3> x;
-  for (auto& each : x) each.resize(dof);
-  return for_each_state(
-      bound, in, {dof, dynamics::inertial_parameters_per_link * dof},
-      [&, x, Y = Eigen::MatrixXd(dof, dynamics::inertial_parameters_per_link * dof)](
-          auto& ws, py::ssize_t i, double* y) mutable {
-        dynamics::inverse_dynamics_regressor(bound.model, ws, in.row(0, i, x[0]),
-                                             in.row(1, i, x[1]), in.row(2, i, x[2]), Y);
-        Eigen::Map<RowMatrix>(y, Y.rows(), Y.cols()) = Y;
-      });
+  const py::ssize_t count = dynamics::inertial_parameters_per_link * dof;
+  return for_each_three(bound, in, {dof, count},
+                        [&, Y = Eigen::MatrixXd(dof, count)](auto& ws, const auto& x, const auto& y,
+                                                             const auto& z, double* out) mutable {
+                          dynamics::inverse_dynamics_regressor(bound.model, ws, x, y, z, Y);
+                          Eigen::Map<RowMatrix>(out, dof, count) = Y;
+                        });
 }
 
 SharedModel with_parameters(const BoundModel& bound, py::handle parameters) {

@@ -60,23 +60,19 @@ py::array_t<double> forward_kinematics(BoundModel& bound, py::handle q) {
   const py::ssize_t dof = bound.model.dof();
   States in("forward_kinematics", dof);
   in.add("q", q);
-  return for_each_state(bound, in, {dof, 4, 4},
-                        [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
-                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-                          for (int link = 0; link < dof; ++link)
-                            write_pose(dynamics::link_pose(bound.model, ws, link), y + 16 * link);
-                        });
+  return for_each_posture(bound, in, {dof, 4, 4}, [&](auto& ws, double* y) {
+    for (int link = 0; link < dof; ++link)
+      write_pose(dynamics::link_pose(bound.model, ws, link), y + 16 * link);
+  });
 }
 
 py::array_t<double> tip_pose(BoundModel& bound, py::handle q) {
   const py::ssize_t dof = bound.model.dof();
   States in("tip_pose", dof);
   in.add("q", q);
-  return for_each_state(bound, in, {4, 4},
-                        [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
-                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-                          write_pose(dynamics::tip_pose(bound.model, ws), y);
-                        });
+  return for_each_posture(bound, in, {4, 4}, [&](auto& ws, double* y) {
+    write_pose(dynamics::tip_pose(bound.model, ws), y);
+  });
 }
 
 // An array with a block of rows × columns per state, in Fortran order if the states are, else in C
@@ -133,12 +129,9 @@ py::array_t<double> frame_pose(BoundModel& bound, py::handle q, py::handle frame
   States in("frame_pose", dof);
   in.add("q", q);
   if (in.single())
-    return for_each_state(
-        bound, in, {4, 4},
-        [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
-          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-          write_pose(dynamics::frame_pose(bound.model, ws, index), y);
-        });
+    return for_each_posture(bound, in, {4, 4}, [&](auto& ws, double* y) {
+      write_pose(dynamics::frame_pose(bound.model, ws, index), y);
+    });
   Blocks out(in, 4, 4);
   dynamics::FrameBatch batch(bound.model, index);
   const std::array<double, block_states> zeros{};
@@ -161,13 +154,10 @@ py::array_t<double> frame_poses(BoundModel& bound, py::handle q) {
   const auto count = static_cast<int>(bound.model.frames().size());
   States in("frame_poses", dof);
   in.add("q", q);
-  return for_each_state(bound, in, {count, 4, 4},
-                        [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
-                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-                          for (int frame = 0; frame < count; ++frame)
-                            write_pose(dynamics::frame_pose(bound.model, ws, frame),
-                                       y + 16 * frame);
-                        });
+  return for_each_posture(bound, in, {count, 4, 4}, [&](auto& ws, double* y) {
+    for (int frame = 0; frame < count; ++frame)
+      write_pose(dynamics::frame_pose(bound.model, ws, frame), y + 16 * frame);
+  });
 }
 
 py::array_t<double> frame_jacobian(BoundModel& bound, py::handle q, py::handle frame,
@@ -178,13 +168,11 @@ py::array_t<double> frame_jacobian(BoundModel& bound, py::handle q, py::handle f
   States in("frame_jacobian", dof);
   in.add("q", q);
   if (in.single())
-    return for_each_state(bound, in, {6, dof},
-                          [&, x = Eigen::VectorXd(dof), J = dynamics::Matrix6Xd(6, dof)](
-                              auto& ws, py::ssize_t i, double* y) mutable {
-                            dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-                            dynamics::frame_jacobian(bound.model, ws, index, terms, J);
-                            Eigen::Map<RowMatrix>(y, 6, dof) = J;
-                          });
+    return for_each_posture(bound, in, {6, dof},
+                            [&, J = dynamics::Matrix6Xd(6, dof)](auto& ws, double* y) mutable {
+                              dynamics::frame_jacobian(bound.model, ws, index, terms, J);
+                              Eigen::Map<RowMatrix>(y, 6, dof) = J;
+                            });
   Blocks out(in, 6, dof);
   dynamics::FrameBatch batch(bound.model, index, {.reference = terms});
   in_blocks(
@@ -254,17 +242,15 @@ py::array_t<double> jacobian(BoundModel& bound, py::handle q, py::handle link, p
   if (!point.is_none()) in_link = vector3_of("jacobian", "point", point);
   States in("jacobian", dof);
   in.add("q", q);
-  return for_each_state(bound, in, {6, dof},
-                        [&, x = Eigen::VectorXd(dof), J = dynamics::Matrix6Xd(6, dof)](
-                            auto& ws, py::ssize_t i, double* y) mutable {
-                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-                          const Eigen::Vector3d at =
-                              in_link  ? dynamics::point_position(bound.model, ws, index, *in_link)
-                              : chosen ? dynamics::link_pose(bound.model, ws, index).p()
-                                       : dynamics::tip_pose(bound.model, ws).p();
-                          dynamics::frame_jacobian(bound.model, ws, index, at, J);
-                          Eigen::Map<RowMatrix>(y, 6, dof) = J;
-                        });
+  return for_each_posture(
+      bound, in, {6, dof}, [&, J = dynamics::Matrix6Xd(6, dof)](auto& ws, double* y) mutable {
+        const Eigen::Vector3d at = in_link
+                                       ? dynamics::point_position(bound.model, ws, index, *in_link)
+                                   : chosen ? dynamics::link_pose(bound.model, ws, index).p()
+                                            : dynamics::tip_pose(bound.model, ws).p();
+        dynamics::frame_jacobian(bound.model, ws, index, at, J);
+        Eigen::Map<RowMatrix>(y, 6, dof) = J;
+      });
 }
 
 py::array_t<double> shape_centers(BoundModel& bound, py::handle q) {
@@ -272,27 +258,23 @@ py::array_t<double> shape_centers(BoundModel& bound, py::handle q) {
   States in("shape_centers", dof);
   in.add("q", q);
   const auto count = static_cast<py::ssize_t>(bound.model.shapes().size());
-  return for_each_state(bound, in, {count, 3},
-                        [&, x = Eigen::VectorXd(dof),
-                         centers = std::vector<Eigen::Vector3d>(bound.model.shapes().size())](
-                            auto& ws, py::ssize_t i, double* y) mutable {
-                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-                          dynamics::shape_centers(bound.model, ws, centers);
-                          for (std::size_t s = 0; s < centers.size(); ++s)
-                            Eigen::Map<Eigen::Vector3d>(y + 3 * s) = centers[s];
-                        });
+  return for_each_posture(bound, in, {count, 3},
+                          [&, centers = std::vector<Eigen::Vector3d>(bound.model.shapes().size())](
+                              auto& ws, double* y) mutable {
+                            dynamics::shape_centers(bound.model, ws, centers);
+                            for (std::size_t s = 0; s < centers.size(); ++s)
+                              Eigen::Map<Eigen::Vector3d>(y + 3 * s) = centers[s];
+                          });
 }
 
 py::array_t<double> center_of_mass(BoundModel& bound, py::handle q) {
   const py::ssize_t dof = bound.model.dof();
   States in("center_of_mass", dof);
   in.add("q", q);
-  return for_each_state(bound, in, {3},
-                        [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
-                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-                          Eigen::Map<Eigen::Vector3d> out(y);
-                          out = dynamics::center_of_mass(bound.model, ws);
-                        });
+  return for_each_posture(bound, in, {3}, [&](auto& ws, double* y) {
+    Eigen::Map<Eigen::Vector3d> out(y);
+    out = dynamics::center_of_mass(bound.model, ws);
+  });
 }
 
 py::array_t<double> centroidal_momentum(BoundModel& bound, py::handle q, py::handle v) {
@@ -308,13 +290,11 @@ py::array_t<double> centroidal_matrix(BoundModel& bound, py::handle q) {
   const py::ssize_t dof = bound.model.dof();
   States in("centroidal_matrix", dof);
   in.add("q", q);
-  return for_each_state(bound, in, {6, dof},
-                        [&, x = Eigen::VectorXd(dof), A = dynamics::Matrix6Xd(6, dof)](
-                            auto& ws, py::ssize_t i, double* y) mutable {
-                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-                          dynamics::centroidal_matrix(bound.model, ws, A);
-                          Eigen::Map<RowMatrix>(y, 6, dof) = A;
-                        });
+  return for_each_posture(bound, in, {6, dof},
+                          [&, A = dynamics::Matrix6Xd(6, dof)](auto& ws, double* y) mutable {
+                            dynamics::centroidal_matrix(bound.model, ws, A);
+                            Eigen::Map<RowMatrix>(y, 6, dof) = A;
+                          });
 }
 
 void add_centroidal(py::class_<BoundModel, SharedModel>& type) {

@@ -11,6 +11,7 @@
 #include "frame_arguments.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/description/robot_io.hpp"
+#include "hamelin/dynamics/centroidal.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/scene/shapes.hpp"
 #include "kinematics.hpp"
@@ -71,17 +72,6 @@ py::array_t<double> call_in_lanes(BoundModel& bound, const States& in, const Sin
   return out;
 }
 
-// A call of three joint vectors and wrenches: f(ws, x, y, z, wrenches, out), state by state.
-template <class F>
-py::array_t<double> call_with_wrenches(BoundModel& bound, const States& in, const F& f) {
-  std::array<Eigen::VectorXd, 3> x;
-  for (auto& each : x) each.resize(in.dof());
-  return for_each_state(bound, in, {in.dof()}, [&, x](auto& ws, py::ssize_t i, double* y) mutable {
-    f(ws, in.row(0, i, x[0]), in.row(1, i, x[1]), in.row(2, i, x[2]),
-      Eigen::Map<Eigen::VectorXd>(y, in.dof()));
-  });
-}
-
 py::array_t<double> rnea(BoundModel& bound, py::handle q, py::handle v, py::handle a,
                          py::handle wrenches) {
   const auto given = wrenches_of("rnea", wrenches);
@@ -90,10 +80,11 @@ py::array_t<double> rnea(BoundModel& bound, py::handle q, py::handle v, py::hand
   in.add("v", v);
   in.add("a", a);
   if (!given.empty())
-    return call_with_wrenches(
-        bound, in, [&](auto& ws, const auto& x, const auto& y, const auto& z, auto&& out) {
-          dynamics::inverse_dynamics(bound.model, ws, x, y, z, given, out);
-        });
+    return for_each_three(bound, in, {in.dof()},
+                          [&](auto& ws, const auto& x, const auto& y, const auto& z, double* out) {
+                            dynamics::inverse_dynamics(bound.model, ws, x, y, z, given,
+                                                       Eigen::Map<Eigen::VectorXd>(out, in.dof()));
+                          });
   return call_in_lanes(
       bound, in,
       [&](auto& ws, const auto& x, const auto& y, const auto& z, auto& out) {
@@ -112,10 +103,11 @@ py::array_t<double> aba(BoundModel& bound, py::handle q, py::handle v, py::handl
   in.add("v", v);
   in.add("tau", tau);
   if (!given.empty())
-    return call_with_wrenches(
-        bound, in, [&](auto& ws, const auto& x, const auto& y, const auto& z, auto&& out) {
-          dynamics::forward_dynamics(bound.model, ws, x, y, z, given, out);
-        });
+    return for_each_three(bound, in, {in.dof()},
+                          [&](auto& ws, const auto& x, const auto& y, const auto& z, double* out) {
+                            dynamics::forward_dynamics(bound.model, ws, x, y, z, given,
+                                                       Eigen::Map<Eigen::VectorXd>(out, in.dof()));
+                          });
   return call_in_lanes(
       bound, in,
       [&](auto& ws, const auto& x, const auto& y, const auto& z, auto& out) {
@@ -260,11 +252,9 @@ SharedModel make_chain(int links, const std::string& axes, double length_m, doub
 }
 
 std::string repr_of_model(const BoundModel& bound) {
-  double mass = 0.0;
-  for (const auto& link : bound.model.robot().links) mass += link.mass_kg;
   return fmt::format("<hamelin.Model '{}': {} joints, {}, {:.4g} kg, {} collision shapes>",
                      bound.model.robot().name, bound.model.dof(),
-                     bound.model.planar() ? "planar" : "spatial", mass,
+                     bound.model.planar() ? "planar" : "spatial", dynamics::total_mass(bound.model),
                      bound.model.shapes().size());
 }
 
@@ -336,12 +326,7 @@ void add_properties(py::class_<BoundModel, SharedModel>& type) {
           "armature", [](const BoundModel& m) { return per_joint(m, &Joint::armature); },
           "Rotor inertia at the joints, shape (n,) [kg m^2 or kg].")
       .def_property_readonly(
-          "mass",
-          [](const BoundModel& m) {
-            double mass = 0.0;
-            for (const auto& link : m.model.robot().links) mass += link.mass_kg;
-            return mass;
-          },
+          "mass", [](const BoundModel& m) { return dynamics::total_mass(m.model); },
           "Mass of all moving links [kg].")
       .def_property_readonly(
           "reach", [](const BoundModel& m) { return m.model.reach(); },

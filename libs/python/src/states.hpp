@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "arguments.hpp"
@@ -110,6 +111,30 @@ py::array_t<double> for_each_state(BoundModel& bound, const States& in,
   dynamics::Workspace ws(bound.model);
   for (py::ssize_t i = 0; i < count; ++i) f(ws, i, y + i * size);
   return out;
+}
+
+/// The same for three joint vectors: f(ws, x, y, z, out).
+template <class F>
+py::array_t<double> for_each_three(BoundModel& bound, const States& in,
+                                   std::vector<py::ssize_t> extents, F f) {
+  std::array<Eigen::VectorXd, 3> x;
+  for (auto& each : x) each.resize(in.dof());
+  return for_each_state(bound, in, std::move(extents),
+                        [&, x](auto& ws, py::ssize_t i, double* y) mutable {
+                          f(ws, in.row(0, i, x[0]), in.row(1, i, x[1]), in.row(2, i, x[2]), y);
+                        });
+}
+
+/// Calls f(ws, out) for each configuration, the first argument, of which ws has the poses.
+template <class F>
+py::array_t<double> for_each_posture(BoundModel& bound, const States& in,
+                                     std::vector<py::ssize_t> extents, F f) {
+  return for_each_state(
+      bound, in, std::move(extents),
+      [&, x = Eigen::VectorXd(in.dof())](auto& ws, py::ssize_t i, double* y) mutable {
+        dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
+        f(ws, y);
+      });
 }
 
 }  // namespace hamelin::python

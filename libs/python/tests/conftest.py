@@ -45,5 +45,10 @@ def scenes(source):
 
 
 @pytest.fixture(scope="session")
+def panda(robots):
+    return hamelin.load_robot(robots / "third_party" / "panda.urdf", tip="panda_hand")
+
+
+@pytest.fixture(scope="session")
 def arm(robots):
     return hamelin.load_robot(robots / "arm7.urdf", spheres=robots / "arm7.spheres.json")

@@ -8,11 +8,6 @@ REFERENCES = ["world", "local", "local_world_aligned"]
 TIME = 1e-6
 
 
-@pytest.fixture(scope="module")
-def panda(robots):
-    return hamelin.load_robot(robots / "third_party" / "panda.urdf", tip="panda_hand")
-
-
 @pytest.fixture
 def state():
     return np.random.default_rng(48).uniform(-0.5, 0.5, size=(3, 7))

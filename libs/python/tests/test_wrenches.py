@@ -5,11 +5,6 @@ import numpy as np
 import pytest
 
 
-@pytest.fixture(scope="module")
-def panda(robots):
-    return hamelin.load_robot(robots / "third_party" / "panda.urdf", tip="panda_hand")
-
-
 @pytest.fixture
 def state():
     return np.random.default_rng(7).uniform(-0.5, 0.5, size=(3, 7))

@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "hamelin/dynamics/centroidal.hpp"
 #include "hamelin/scene/self_collision.hpp"
 
 namespace hamelin::scene {
@@ -31,9 +32,7 @@ std::size_t count_shapes(const model::Model& model, bool capsules) {
 Json robot_info(const model::Model& model) {
   const auto& robot = model.robot();
   Json links = Json::array();
-  double mass = 0.0;
   for (const auto& link : robot.links) {
-    mass += link.mass_kg;
     links.push_back(
         {{"name", link.name},
          {"joint", link.joint.name},
@@ -63,7 +62,7 @@ Json robot_info(const model::Model& model) {
           {"tip", robot.tip.name},
           {"tip_link", robot.links[static_cast<std::size_t>(robot.tip.link)].name},
           {"frames", std::move(frames)},
-          {"mass_kg", mass},
+          {"mass_kg", dynamics::total_mass(model)},
           {"reach_m", model.reach()},
           {"spheres", count_shapes(model, false)},
           {"capsules", count_shapes(model, true)},

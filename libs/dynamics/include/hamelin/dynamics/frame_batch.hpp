@@ -5,8 +5,6 @@
 
 namespace hamelin::dynamics {
 
-struct FrameBatchKernel;
-
 /// Poses and Jacobians of one frame at many states, one state per lane of a SIMD register. An
 /// object serves one caller at a time. Large results are limited by memory: blocks of some hundred
 /// states stay in the cache.
@@ -23,8 +21,8 @@ class FrameBatch {
   /// @throws Error usage for a frame that does not exist, less than one thread, or as Workspace
   FrameBatch(const Model& model, int frame, const Settings& settings);
   FrameBatch(const Model& model, int frame) : FrameBatch(model, frame, Settings()) {}
-  FrameBatch(FrameBatch&&) noexcept;
-  FrameBatch& operator=(FrameBatch&&) noexcept;
+  FrameBatch(const FrameBatch&) = delete;
+  FrameBatch& operator=(const FrameBatch&) = delete;
   ~FrameBatch();
 
   /// World poses, as functions of frames.hpp give them up to rounding.

@@ -1,4 +1,6 @@
 #pragma once
+#include <Eigen/Geometry>
+
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/formatted.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
@@ -37,6 +39,36 @@ inline Eigen::Vector3d velocity_column(const Model& model, const Workspace& ws, 
                                        const Eigen::Vector3d& point) {
   const Workspace::Frame& at = ws.frames[static_cast<std::size_t>(joint)];
   return is_prismatic(model, joint) ? at.axis : Eigen::Vector3d(at.axis.cross(point - at.p));
+}
+
+/// How a body moves, by one of its points, in world axes: docs/theory.md (2.34), (2.35).
+struct BodyMotion {
+  Eigen::Vector3d omega = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d omega_rate = Eigen::Vector3d::Zero(), acceleration = Eigen::Vector3d::Zero();
+
+  /// To another point of the same body.
+  void shift(const Eigen::Vector3d& by) noexcept {
+    acceleration += omega_rate.cross(by) + omega.cross(omega.cross(by));
+    velocity += omega.cross(by);
+  }
+  /// From the link before joint j, or the root, to the link that the joint moves, by the origins of
+  /// their joint-aligned frames; ws has the poses.
+  void advance(const Model& model, const Workspace& ws, int j, double v, double a) noexcept {
+    const Workspace::Frame& at = ws.frames[static_cast<std::size_t>(j)];
+    if (j > 0) shift(at.p - ws.frames[static_cast<std::size_t>(j - 1)].p);
+    if (is_prismatic(model, j)) {
+      acceleration += at.axis * a + 2.0 * omega.cross(at.axis) * v;
+      velocity += at.axis * v;
+    } else {
+      omega_rate += at.axis * a + omega.cross(at.axis) * v;
+      omega += at.axis * v;
+    }
+  }
+};
+
+/// The inertia of a point mass about an origin, from which it is displaced by c.
+inline Eigen::Matrix3d point_inertia(double mass, const Eigen::Vector3d& c) noexcept {
+  return mass * (c.squaredNorm() * Eigen::Matrix3d::Identity() - c * c.transpose());
 }
 
 /// τ from the sums in ws.forces, each a moment about the origin of its link's joint-aligned frame
