@@ -30,9 +30,8 @@ void add_integrator_flags(CLI::App& command, IntegratorFlags& flags) {
   restrict_to_integrators(command.add_option(
       "--integrator", flags.integrator,
       "time integrator (default the scene's, or hamel-variational). lie-exact: Lee and others "
-      "2016, "
-      "with momenta at nodes and closed-form dexp. feedback: Chang and others 2016, attracts joint "
-      "circles and energy, rk4"));
+      "2016, with momenta at nodes and closed-form dexp. energy-attractor: Chang and others 2016, "
+      "attracts joint circles and energy, rk4"));
   command
       .add_option("--alpha", flags.alpha,
                   "hamel: point of the step at which velocities are taken, 0 to 1 (default 0.5)")

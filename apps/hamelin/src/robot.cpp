@@ -80,7 +80,7 @@ void print_table(const Json& robot) {
       robot["self_collision_parts"].get<std::size_t>(),
       robot["self_collision_pairs"].get<std::size_t>(),
       robot["self_collision_disabled"].get<std::size_t>());
-  fmt::print("{}", notes_text(robot["notes"]));
+  fmt::print("{}", notes_text(robot["notes"], robot["warnings"]));
 }
 
 void print_robot_info(const RobotInfoOptions& options) {

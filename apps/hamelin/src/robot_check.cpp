@@ -75,7 +75,7 @@ void print(const fit::SelfCheck& check, const model::Robot& robot,
   for (const auto& line : check.suspicious_limits) text += fmt::format("limits: {}\n", line);
   for (const auto& link : check.links_without_shapes)
     text += fmt::format("no shapes: collisions of moving link '{}' are not checked\n", link);
-  text += notes_text(robot.notes);
+  text += notes_text(robot.notes, robot.warnings);
   const auto faults = check.contacts_at_rest();
   const auto checked = std::count_if(check.pairs.begin(), check.pairs.end(),
                                      [](const fit::PartPair& p) { return p.checked; });

@@ -7,14 +7,14 @@
 namespace hamelin::app {
 
 void note_warnings(const model::Robot& robot, const std::filesystem::path& file) {
-  for (const auto& warning : model::warnings(robot))
-    note(fmt::format("{}: {}", file.string(), warning));
+  for (const auto& warning : robot.warnings) note(fmt::format("{}: {}", file.string(), warning));
 }
 
-std::string notes_text(const std::vector<std::string>& notes) {
+std::string notes_text(const std::vector<std::string>& notes,
+                       const std::vector<std::string>& warnings) {
   std::string text;
-  for (const auto& line : notes)
-    text += fmt::format("{}{}\n", line.starts_with("warning: ") ? "" : "note: ", line);
+  for (const auto& line : notes) text += fmt::format("note: {}\n", line);
+  for (const auto& line : warnings) text += fmt::format("warning: {}\n", line);
   return text;
 }
 

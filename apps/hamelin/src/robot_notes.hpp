@@ -11,7 +11,8 @@ namespace hamelin::app {
 /// Prints each warning as a note on stderr.
 void note_warnings(const model::Robot& robot, const std::filesystem::path& file);
 
-/// All notes as lines of a report: "note: ..." and "warning: ...".
-[[nodiscard]] std::string notes_text(const std::vector<std::string>& notes);
+/// All of them as lines of a report: "note: ..." and "warning: ...".
+[[nodiscard]] std::string notes_text(const std::vector<std::string>& notes,
+                                     const std::vector<std::string>& warnings);
 
 }  // namespace hamelin::app

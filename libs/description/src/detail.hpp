@@ -65,7 +65,7 @@ void round_to_quaternions(Robot& robot);
 /// @throws Error invalid if the direction is zero
 [[nodiscard]] std::string normalise_screw(Joint& joint, const std::string& where);
 
-/// Adds a warning to the robot's notes, once, if an inertia has a model::triangle_fault.
+/// Adds a warning to the robot, once, if an inertia has a model::triangle_fault.
 /// @param strict whether to throw an Error instead
 /// @param where prefix of error messages
 /// @throws Error invalid if `strict`

@@ -356,10 +356,10 @@ void detail::check_triangle_inequality(Robot& robot, const std::string& link,
   if (fault.empty()) return;
   if (strict)
     throw Error(ErrorCode::invalid, fmt::format("{}: link '{}': inertia {}", where, link, fault));
-  const std::string note = fmt::format("{}link '{}': inertia {}; it is used as given",
-                                       model::warning_prefix, link, fault);
-  if (std::find(robot.notes.begin(), robot.notes.end(), note) == robot.notes.end())
-    robot.notes.push_back(note);
+  const std::string warning =
+      fmt::format("link '{}': inertia {}; it is used as given", link, fault);
+  if (std::find(robot.warnings.begin(), robot.warnings.end(), warning) == robot.warnings.end())
+    robot.warnings.push_back(warning);
 }
 
 void detail::round_to_quaternions(Robot& robot) {
@@ -407,6 +407,8 @@ Robot robot_from_json(const Json& document, const std::string& where) {
   robot.name = document["name"].get<std::string>();
   for (const auto& note : list_of(document, "notes"))
     robot.notes.push_back(note.get<std::string>());
+  for (const auto& warning : list_of(document, "warnings"))
+    robot.warnings.push_back(warning.get<std::string>());
   std::vector<std::string> names;
   for (const auto& json : document["links"]) {
     const std::string place = fmt::format("{}: /links/{}", where, robot.links.size());
@@ -471,6 +473,7 @@ Json robot_to_json(const Robot& robot) {
   for (const auto& [a, b] : robot.self_collision_disabled)
     json["self_collision_disabled"].push_back(Json::array({a, b}));
   if (!robot.notes.empty()) json["notes"] = robot.notes;
+  if (!robot.warnings.empty()) json["warnings"] = robot.warnings;
   return json;
 }
 

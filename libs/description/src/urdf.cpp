@@ -232,7 +232,8 @@ class Reader {
                                       fmt::format("{}: line {}", where_, link.shapes.line));
     if (mass == 0.0 && I.isZero(0.0)) return std::nullopt;
     if (mass == 0.0)
-      note("warning: link '{}' has inertia but no mass; the inertia is used", link.name());
+      robot_.warnings.push_back(
+          fmt::format("link '{}' has inertia but no mass; the inertia is used", link.name()));
     return Inertial{tree_.poses.at(link.name()) * link.inertial->pose, mass, I, &link};
   }
 

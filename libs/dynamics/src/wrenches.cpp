@@ -80,6 +80,13 @@ void external_torque(const Model& model, Workspace& ws, const ConstVectorRef& q,
   sum("external_torque", model, ws, wrenches, tau.data());
 }
 
+void external_torque(const Model& model, Workspace& ws, std::span<const ExternalWrench> wrenches,
+                     VectorRef tau) {
+  detail::Call::with_poses("external_torque", model, ws.owner).joints("tau", tau);
+  check_frames("external_torque", model, wrenches);
+  sum("external_torque", model, ws, wrenches, tau.data());
+}
+
 void external_torque_derivative(const Model& model, Workspace& ws, const ConstVectorRef& q,
                                 std::span<const ExternalWrench> wrenches, MatrixRef dtau_dq) {
   constexpr const char* function = "external_torque_derivative";
@@ -128,7 +135,7 @@ void forward_dynamics_derivatives(const Model& model, DerivativesWorkspace& ws,
                                   std::span<const ExternalWrench> wrenches, VectorRef a,
                                   MatrixRef da_dq, MatrixRef da_dv, MatrixRef da_dtau) {
   external_torque_derivative(model, ws.ws, q, wrenches, ws.external);
-  external_torque(model, ws.ws, q, wrenches, ws.ws.column_in);
+  external_torque(model, ws.ws, wrenches, ws.ws.column_in);
   detail::Call("forward_dynamics_derivatives", model, ws.ws.owner).joints("tau", tau);
   ws.ws.column_in += tau;
   forward_dynamics_derivatives(model, ws, q, v, ws.ws.column_in, a, da_dq, da_dv, da_dtau);

@@ -1,13 +1,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "check_channels.hpp"
+#include "channels/check_channels.hpp"
+#include "channels/wrench_forces.hpp"
 #include "finite.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/formatted.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "state_owner.hpp"
-#include "wrench_forces.hpp"
 
 namespace hamelin::integration {
 

@@ -1,17 +1,17 @@
 #include <type_traits>
 
 #include "check_options.hpp"
-#include "composition.hpp"
-#include "dop853.hpp"
-#include "explicit.hpp"
-#include "feedback.hpp"
-#include "gauss.hpp"
-#include "hamel.hpp"
-#include "lie_exact.hpp"
-#include "newmark.hpp"
-#include "rosenbrock.hpp"
+#include "reference/composition.hpp"
+#include "reference/dop853.hpp"
+#include "reference/energy_attractor.hpp"
+#include "reference/explicit.hpp"
+#include "reference/lie_exact.hpp"
+#include "reference/newmark.hpp"
+#include "reference/rosenbrock.hpp"
+#include "schemes/gauss.hpp"
+#include "schemes/hamel.hpp"
+#include "schemes/variational.hpp"
 #include "state_owner.hpp"
-#include "variational.hpp"
 
 namespace hamelin::integration {
 
@@ -41,8 +41,8 @@ std::unique_ptr<Integrator> make(const Model& model, const SemiImplicitEulerOpti
 std::unique_ptr<Integrator> make(const Model& model, const NewmarkOptions& o) {
   return std::make_unique<Newmark>(model, o);
 }
-std::unique_ptr<Integrator> make(const Model& model, const FeedbackOptions& o) {
-  return std::make_unique<Feedback>(model, o);
+std::unique_ptr<Integrator> make(const Model& model, const EnergyAttractorOptions& o) {
+  return std::make_unique<EnergyAttractor>(model, o);
 }
 std::unique_ptr<Integrator> make(const Model& model, const Rk4Options& o) {
   return std::make_unique<Rk4>(model, o);

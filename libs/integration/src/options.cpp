@@ -35,7 +35,7 @@ const std::vector<Entry>& table() {
       {{"composition", {newton}, {4, 6, 8}, false, true}, CompositionOptions{}},
       {{"semi-implicit-euler", {}, {}, false, false}, SemiImplicitEulerOptions{}},
       {{"newmark", {}, {}, false, true}, NewmarkOptions{}},
-      {{"feedback", {}, {}, false, false}, FeedbackOptions{}},
+      {{"energy-attractor", {}, {}, false, false}, EnergyAttractorOptions{}},
       {{"rk4", {}, {}, false, false}, Rk4Options{}},
       {{"dop853", {}, {}, true, false}, Dop853Options{}},
       {{"rosenbrock", {}, {}, true, false}, RosenbrockOptions{}},

@@ -2,13 +2,13 @@
 
 #include <type_traits>
 
-#include "check_channels.hpp"
+#include "channels/check_channels.hpp"
 #include "check_options.hpp"
-#include "gauss_derivatives.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/formatted.hpp"
+#include "schemes/gauss_derivatives.hpp"
+#include "schemes/variational_derivatives.hpp"
 #include "state_owner.hpp"
-#include "variational_derivatives.hpp"
 
 namespace hamelin::integration {
 

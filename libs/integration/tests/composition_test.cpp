@@ -1,4 +1,4 @@
-#include "../src/composition.hpp"
+#include "reference/composition.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>

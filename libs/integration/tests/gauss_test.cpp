@@ -1,4 +1,4 @@
-#include "../src/gauss_tableau.hpp"
+#include "schemes/gauss_tableau.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>

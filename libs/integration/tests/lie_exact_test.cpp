@@ -2,11 +2,11 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "../src/kernel/lie_exact.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/test/chains.hpp"
 #include "hamelin/test/robots.hpp"
+#include "reference/lie_exact_sweeps.hpp"
 
 using namespace hamelin;
 using namespace hamelin::integration;

@@ -2,11 +2,11 @@
 #include <catch2/catch.hpp>
 #include <vector>
 
-#include "../src/kernel/variational.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/dynamics/kernel/planar.hpp"
 #include "hamelin/dynamics/kernel/spatial.hpp"
 #include "hamelin/test/robots.hpp"
+#include "kernel/variational.hpp"
 
 using namespace hamelin;
 using Eigen::MatrixXd;

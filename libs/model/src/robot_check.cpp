@@ -254,13 +254,6 @@ Matrix3d symmetric_part(const Matrix3d& inertia) {
   return 0.5 * (inertia + inertia.transpose());
 }
 
-std::vector<std::string> warnings(const Robot& robot) {
-  std::vector<std::string> out;
-  for (const std::string& note : robot.notes)
-    if (note.starts_with(warning_prefix)) out.push_back(note.substr(warning_prefix.size()));
-  return out;
-}
-
 void check(const Robot& robot, const std::string& where) {
   if (robot.links.empty()) fail(where, "the robot has no moving link, expected at least one");
   std::set<std::string> links, joints;

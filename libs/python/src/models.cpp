@@ -345,7 +345,7 @@ void add_properties(py::class_<BoundModel, SharedModel>& type) {
           "notes", [](const BoundModel& m) { return m.model.robot().notes; },
           "What the reader of the robot file lumped, locked or skipped.")
       .def_property_readonly(
-          "warnings", [](const BoundModel& m) { return model::warnings(m.model.robot()); },
+          "warnings", [](const BoundModel& m) { return m.model.robot().warnings; },
           "Doubtful input that the reader accepted.");
 }
 

@@ -73,7 +73,7 @@ Json robot_info(const model::Model& model) {
           {"self_collision_pairs", self.pairs().size()},
           {"links", links},
           {"notes", notes},
-          {"warnings", model::warnings(robot)}};
+          {"warnings", robot.warnings}};
 }
 
 }  // namespace hamelin::scene

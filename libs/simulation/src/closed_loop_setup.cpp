@@ -74,7 +74,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
       v_shown_(q_shown_),
       bare_(model_) {
   make_plant(plant_factory);
-  result_.warnings = model::warnings(model_.robot());
+  result_.warnings = model_.robot().warnings;
   const planning::Plugin plugin = control::find_planner(scene, plugin_directories);
   planner_params_ = control::planner_params(scene, plugin);
   steps_ =

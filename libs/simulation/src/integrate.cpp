@@ -121,7 +121,7 @@ FreeRun::FreeRun(const model::Model& model, const FreeMotion& motion, const Watc
 
 void FreeRun::write_header(const Watch& watch) {
   result_.scene = motion_.name;
-  result_.warnings = model::warnings(model_.robot());
+  result_.warnings = model_.robot().warnings;
   result_.provenance = log::provenance(motion_.inputs, watch.argv);
   recorder_.header({{"program", "integrate"},
                     {"scene", motion_.name},

@@ -104,7 +104,7 @@ bool TrackingAudit::is_clear(const Eigen::VectorXd& q, control::WorldView& judge
 
 // docs/theory.md (16.12)
 bool TrackingAudit::solve(const scene::Goal& goal, const geometry::SE3& target) {
-  using Vector6d = Eigen::Matrix<double, 6, 1>;
+  using geometry::Vector6d;
   for (int i = 0; i < ik_iterations; ++i) {
     dynamics::forward_kinematics(model_, ws_, q_);
     const geometry::SE3 tip = dynamics::tip_pose(model_, ws_);

@@ -69,7 +69,7 @@ class Follower {
   [[nodiscard]] bool fix_worst(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
                                const Eigen::VectorXd& u);
 
-  using Vector6d = Eigen::Matrix<double, 6, 1>;
+  using Vector6d = geometry::Vector6d;
   using Matrix6d = Eigen::Matrix<double, 6, 6>;
   const model::Model& model_;
   FollowParams params_{};

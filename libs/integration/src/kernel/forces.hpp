@@ -39,12 +39,22 @@ HAMELIN_INLINE dynamics::kernel::Lanes<W> tanh_of(dynamics::kernel::Lanes<W> x) 
   return x;
 }
 
+/// The torque with which damping opposes the rate of joint i, and that of dry friction.
+template <class Real>
+HAMELIN_INLINE Real damping_of(const Forces& f, std::size_t i, Real rate) noexcept {
+  return rate * Real(f.damping[i]);
+}
+template <class Real>
+HAMELIN_INLINE Real dry_friction(const Forces& f, std::size_t i, Real rate) noexcept {
+  return tanh_of(rate / Real(f.coulomb_speed)) * Real(f.coulomb[i]);
+}
+
 /// Held torque, damping and dry friction of joint i at its rate.
 template <class Real>
 HAMELIN_INLINE Real joint_force(const Forces& f, std::size_t i, Real rate) noexcept {
   Real force(f.held != nullptr ? f.held[i] : 0.0);
-  if (f.damping != nullptr) force -= rate * Real(f.damping[i]);
-  if (f.coulomb != nullptr) force -= tanh_of(rate / Real(f.coulomb_speed)) * Real(f.coulomb[i]);
+  if (f.damping != nullptr) force -= damping_of(f, i, rate);
+  if (f.coulomb != nullptr) force -= dry_friction(f, i, rate);
   return force;
 }
 
@@ -65,10 +75,10 @@ HAMELIN_INLINE void add_joint_work(const Forces& f, std::size_t n, double dt, Wo
   if (f.held != nullptr)
     for (std::size_t i = 0; i < n; ++i) work.held += f.held[i] * rate(i) * dt;
   if (f.damping != nullptr)
-    for (std::size_t i = 0; i < n; ++i) work.dissipated += f.damping[i] * rate(i) * rate(i) * dt;
+    for (std::size_t i = 0; i < n; ++i) work.dissipated += damping_of(f, i, rate(i)) * rate(i) * dt;
   if (f.coulomb != nullptr)
     for (std::size_t i = 0; i < n; ++i)
-      work.dissipated += f.coulomb[i] * tanh_of(rate(i) / f.coulomb_speed) * rate(i) * dt;
+      work.dissipated += dry_friction(f, i, rate(i)) * rate(i) * dt;
 }
 
 }  // namespace HAMELIN_ISA_NAMESPACE

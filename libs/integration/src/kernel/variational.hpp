@@ -71,7 +71,7 @@ class Variational {
 
  public:
   static std::size_t bytes(std::size_t n) noexcept {
-    return Scratch::bytes(n) + n * sizeof(Factors) + 6 * n * sizeof(double);
+    return Scratch::bytes(n) + n * sizeof(Factors) + 7 * n * sizeof(double);
   }
   static VariationalOutcome step(const VariationalCall<Chain>& call, void* memory) noexcept {
     Variational v(call, memory);
@@ -103,7 +103,8 @@ class Variational {
         plus_(rate_ + n_),
         residual_(plus_ + n_),
         force_(residual_ + n_),
-        sigma_(force_ + n_) {}
+        sigma_(force_ + n_),
+        external_(sigma_ + n_) {}
 
   /// R and p⁺ at the current Δ.
   void evaluate() noexcept { sweep<false>(); }
@@ -150,8 +151,8 @@ class Variational {
       for (std::size_t i = 0; i < n_; ++i) force_[i] += sigma_[i];
     }
     if (f.external.evaluate != nullptr) {
-      f.external.evaluate(f.external.context, mid_, rate_, sigma_);
-      for (std::size_t i = 0; i < n_; ++i) force_[i] += sigma_[i];
+      f.external.evaluate(f.external.context, mid_, rate_, external_);
+      for (std::size_t i = 0; i < n_; ++i) force_[i] += external_[i];
     }
   }
 
@@ -351,10 +352,8 @@ class Variational {
       dynamics::kernel::gyroscopic_torque<Space>(call_.chain, k_, f.spins, f.spin_count, sigma_);
       for (std::size_t i = 0; i < n_; ++i) out_.work.gyroscopic += sigma_[i] * rate_[i] * call_.h;
     }
-    if (f.external.evaluate != nullptr) {
-      f.external.evaluate(f.external.context, mid_, rate_, sigma_);
-      for (std::size_t i = 0; i < n_; ++i) out_.work.external += sigma_[i] * rate_[i] * call_.h;
-    }
+    if (f.external.evaluate != nullptr)
+      for (std::size_t i = 0; i < n_; ++i) out_.work.external += external_[i] * rate_[i] * call_.h;
   }
 
   const VariationalCall<Chain>& call_;
@@ -365,6 +364,7 @@ class Variational {
   Scratch k_;
   Factors* f_;
   double *mid_, *rate_, *plus_, *residual_, *force_, *sigma_;
+  double* external_;  ///< torques of the wrenches in the last sweep
 };
 
 }  // namespace HAMELIN_ISA_NAMESPACE

@@ -11,7 +11,7 @@
 /// O(depth of the link).
 namespace hamelin::dynamics {
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
+using geometry::Vector6d;
 
 /// In which terms a twist of a frame is given.
 enum class Reference {

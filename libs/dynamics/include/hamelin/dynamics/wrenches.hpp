@@ -25,6 +25,9 @@ struct ExternalWrench {
 /// @throws Error usage for sizes, a frame that does not exist, or a workspace of another model
 void external_torque(const Model& model, Workspace& ws, const ConstVectorRef& q,
                      std::span<const ExternalWrench> wrenches, VectorRef tau);
+/// The same at the poses in ws, after forward_kinematics.
+void external_torque(const Model& model, Workspace& ws, std::span<const ExternalWrench> wrenches,
+                     VectorRef tau);
 
 /// ∂(Σ Jᵀ F)/∂q at constant F, n × n, row i the torque of joint i, O(n² wrenches). Overwrites the
 /// poses in ws.

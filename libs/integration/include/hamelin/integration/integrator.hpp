@@ -71,7 +71,7 @@ struct State {
   double time_s = 0.0;
   long k = 0;
   VectorXd q;
-  VectorXd v;                  ///< velocity at the node: explicit schemes, newmark, feedback
+  VectorXd v;                  ///< velocity at the node: explicit schemes, newmark
   VectorXd p;                  ///< momentum at the node [Nm s]; hamel: impulses since the last step
   bool jumped = true;          ///< whether the velocity was set or kicked since the last step
   VectorXd memory;             ///< the scheme's own data, e.g. hamel: body twists of the last step

@@ -89,8 +89,8 @@ struct NewmarkOptions {
   Isa isa = default_isa();
 };
 
-/// Options of the feedback integrator after Chang, Jiménez, Perlmutter (2016).
-struct FeedbackOptions {
+/// Options of energy-attractor, a feedback integrator after Chang, Jiménez, Perlmutter (2016).
+struct EnergyAttractorOptions {
   Isa isa = default_isa();
 };
 
@@ -113,7 +113,7 @@ struct RosenbrockOptions {
 using Options =
     std::variant<HamelOptions, HamelMidpointOptions, VariationalOptions, GaussOptions,
                  LieExactOptions, CompositionOptions, SemiImplicitEulerOptions, NewmarkOptions,
-                 FeedbackOptions, Rk4Options, Dop853Options, RosenbrockOptions>;
+                 EnergyAttractorOptions, Rk4Options, Dop853Options, RosenbrockOptions>;
 
 /// Options of a scheme that is chosen by name, as in scene files and on command lines; what is not
 /// set keeps the scheme's default. Solver, order and step control are refused by schemes that have

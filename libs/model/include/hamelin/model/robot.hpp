@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -11,7 +10,7 @@
 
 namespace hamelin::model {
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
+using geometry::Vector6d;
 
 enum class JointType : std::int32_t { revolute, prismatic };
 
@@ -69,7 +68,8 @@ struct Frame {
 
 /// An open chain as a file describes it, in one form for all file formats: screws and poses in the
 /// base frame at q = 0, the other quantities of a link in its COM frame (examples: data/robots).
-/// `notes` lists what the reader lumped, locked or skipped.
+/// `notes` lists what the reader lumped, locked or skipped, `warnings` doubtful input that it
+/// accepted.
 struct Robot {
   std::string name;
   std::vector<Link> links;
@@ -83,7 +83,7 @@ struct Robot {
   /// Pairs of parts that never count as colliding. A part is a link, or a link of the file that was
   /// lumped into another link or into the base.
   std::vector<std::pair<std::string, std::string>> self_collision_disabled;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes, warnings;
 
   [[nodiscard]] int dof() const noexcept { return static_cast<int>(links.size()); }
 };
@@ -104,12 +104,6 @@ void check(const Robot& robot, const std::string& where);
 /// The violation of the triangle inequality by an inertia's principal moments; empty if there is
 /// none. No rigid body violates it.
 [[nodiscard]] std::string triangle_fault(const Eigen::Matrix3d& inertia);
-
-/// The prefix of notes that are warnings.
-inline constexpr std::string_view warning_prefix = "warning: ";
-
-/// The notes that are warnings, without the prefix: doubtful input that the reader accepted.
-[[nodiscard]] std::vector<std::string> warnings(const Robot& robot);
 
 /// (I + Iᵀ)/2 for an inertia I. A symmetric I is returned bit for bit.
 [[nodiscard]] Eigen::Matrix3d symmetric_part(const Eigen::Matrix3d& inertia);

@@ -1,4 +1,4 @@
-#include "feedback.hpp"
+#include "energy_attractor.hpp"
 
 #include <cmath>
 
@@ -13,8 +13,8 @@ constexpr double gain = 10.0;
 
 }  // namespace
 
-Feedback::Feedback(const Model& model, const FeedbackOptions& options)
-    : Explicit("feedback", model, {options.isa}) {
+EnergyAttractor::EnergyAttractor(const Model& model, const EnergyAttractorOptions& options)
+    : Explicit("energy-attractor", model, {options.isa}) {
   for (const auto& link : model.robot().links)
     revolute_.push_back(link.joint.type == model::JointType::revolute);
   for (auto* x : {&q_, &v_, &c_, &s_, &dc_, &ds_, &dv_, &c_sum_, &s_sum_, &v_sum_})
@@ -23,12 +23,12 @@ Feedback::Feedback(const Model& model, const FeedbackOptions& options)
 }
 
 // State::memory: c and s of all joints (for a prismatic joint the coordinate and 0), then E*.
-void Feedback::begin(State& state, const ConstVectorRef& v0) {
+void EnergyAttractor::begin(State& state, const ConstVectorRef& v0) {
   state.memory = VectorXd::Zero(2 * model_.dof() + 1);
   Explicit::begin(state, v0);
 }
 
-void Feedback::embed(const State& state) {
+void EnergyAttractor::embed(const State& state) {
   const Eigen::Index n = model_.dof();
   if (!state.jumped) {
     embedded_ = state.memory;
@@ -42,7 +42,7 @@ void Feedback::embed(const State& state) {
   embedded_[2 * n] = node_energy(state).total();
 }
 
-StepReport Feedback::attempt(State& state, const Channels& channels, double h) {
+StepReport EnergyAttractor::attempt(State& state, const Channels& channels, double h) {
   static constexpr std::array<double, 4> node{0.0, 0.5, 0.5, 1.0},
       b{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
   const Eigen::Index n = model_.dof();

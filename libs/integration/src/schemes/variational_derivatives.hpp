@@ -1,5 +1,5 @@
 #pragma once
-#include "force_derivatives.hpp"
+#include "channels/force_derivatives.hpp"
 #include "hamelin/dynamics/derivatives.hpp"
 #include "hamelin/integration/step_derivatives.hpp"
 #include "linear_system.hpp"

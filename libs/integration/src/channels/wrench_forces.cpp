@@ -30,11 +30,9 @@ void WrenchForces::end() {
 // Kernels must not be left by an exception. The step that finds no number fails.
 const VectorXd& WrenchForces::evaluate(const VectorXd& q, const VectorXd& v) {
   try {
-    if (channels_->wrench_law && !thrown_) {
-      dynamics::forward_kinematics(model_, ws_, q);
-      channels_->wrench_law(ws_, q, v, wrenches_);
-    }
-    dynamics::external_torque(model_, ws_, q, wrenches_, torque_);
+    dynamics::forward_kinematics(model_, ws_, q);
+    if (channels_->wrench_law && !thrown_) channels_->wrench_law(ws_, q, v, wrenches_);
+    dynamics::external_torque(model_, ws_, wrenches_, torque_);
   } catch (...) {
     thrown_ = std::current_exception();
   }

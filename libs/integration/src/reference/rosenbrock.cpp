@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "channels/kernel_arguments.hpp"
 #include "finite.hpp"
 #include "hamelin/core/formatted.hpp"
 
@@ -10,7 +11,6 @@ namespace hamelin::integration {
 namespace {
 
 constexpr double default_tolerance = 1e-10;
-constexpr double difference = 1e-5;  // increment of the central differences; error about 1e-10
 constexpr StepController::Rule rule{4.0, 0.9, 0.2, 6.0};
 
 // The published coefficients in the form of rodas.f, in which no stage multiplies by the Jacobian,
@@ -48,11 +48,13 @@ Rosenbrock::Rosenbrock(const Model& model, const RosenbrockOptions& options)
 Rosenbrock::Rosenbrock(const RosenbrockOptions& options, const Model& model)
     : Explicit("rosenbrock", model,
                {.isa = options.isa, .rtol = options.rtol, .atol = options.atol}),
+      derivatives_(model, options.isa),
+      forces_by_(model.dof()),
       factors_(model.dof()) {
   const int n = model.dof();
-  by_q_ = by_v_ = matrix_ = Eigen::MatrixXd::Zero(n, n);
+  by_q_ = by_v_ = inverse_mass_ = matrix_ = Eigen::MatrixXd::Zero(n, n);
   works_by_q_ = works_by_v_ = Eigen::Matrix4Xd::Zero(4, n);
-  for (auto* x : {&q_, &v_, &right_q_, &right_v_, &up_}) *x = VectorXd::Zero(n);
+  for (auto* x : {&q_, &v_, &right_q_, &right_v_}) *x = VectorXd::Zero(n);
   dq_.fill(q_);
   dv_.fill(q_);
 }
@@ -69,24 +71,27 @@ Rosenbrock::Works Rosenbrock::derivative(const Channels& channels, const VectorX
   return {power.gyroscopic_work_J, power.dissipated_J, power.held_work_J, power.external_work_J};
 }
 
+// docs/theory.md (7.20): gyroscopic terms have no power anywhere.
 void Rosenbrock::make_jacobian(const State& state, const Channels& channels, StepReport& report) {
-  q_ = state.q;
-  v_ = state.v;
-  const auto column = [&](double& number, auto&& acceleration, auto&& works) {
-    const double at = number;
-    number = at + difference;
-    const Works works_up = derivative(channels, q_, v_, report);
-    up_ = acceleration_;
-    number = at - difference;
-    const Works works_down = derivative(channels, q_, v_, report);
-    number = at;
-    acceleration = (up_ - acceleration_) / (2.0 * difference);
-    works = (works_up - works_down) / (2.0 * difference);
-  };
-  for (Eigen::Index j = 0; j < state.q.size(); ++j) {
-    column(q_[j], by_q_.col(j), works_by_q_.col(j));
-    column(v_[j], by_v_.col(j), works_by_v_.col(j));
+  forces_by_.evaluate(model_, channels, ws_, state.q, state.v, *wrenches_);
+  dynamics::forward_dynamics_derivatives(model_, derivatives_, state.q, state.v, forces_by_.force,
+                                         acceleration_, by_q_, by_v_, inverse_mass_);
+  by_q_.noalias() += inverse_mass_ * forces_by_.by_q;
+  by_v_.noalias() += inverse_mass_ * forces_by_.by_v;
+  ++report.evaluations;
+  works_by_q_.setZero();
+  works_by_v_.setZero();
+  const kernel::Forces joints = joint_forces(channels);
+  for (Eigen::Index i = 0; i < state.v.size(); ++i) {
+    const auto joint = static_cast<std::size_t>(i);
+    const double held = joints.held != nullptr ? joints.held[i] : 0.0,
+                 braking = held - kernel::joint_force(joints, joint, state.v[i]);
+    works_by_v_(1, i) = braking + kernel::joint_force_slope(joints, joint, state.v[i]) * state.v[i];
+    works_by_v_(2, i) = held;
   }
+  works_by_q_.row(3).noalias() = state.v.transpose() * forces_by_.external_by_q;
+  works_by_v_.row(3).noalias() = state.v.transpose() * forces_by_.external_by_v;
+  works_by_v_.row(3) += forces_by_.external.transpose();
 }
 
 // docs/theory.md (7.14): the increments (dq, dv) of a stage solve dq/(γh) − dv = r_q and

@@ -9,9 +9,9 @@ namespace hamelin::integration {
 /// energy at the start plus the work booked since, docs/theory.md (7.8)–(7.10):
 ///   ċ = −s v − κ (c² + s² − 1) c,   ṡ = c v − κ (c² + s² − 1) s,
 ///   v̇ = a − κ v (E − E*)/(2K + |E − E*|).
-class Feedback final : public Explicit {
+class EnergyAttractor final : public Explicit {
  public:
-  Feedback(const Model& model, const FeedbackOptions& options);
+  EnergyAttractor(const Model& model, const EnergyAttractorOptions& options);
   [[nodiscard]] int order() const override { return 4; }
 
  private:

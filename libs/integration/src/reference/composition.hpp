@@ -2,7 +2,7 @@
 #include <span>
 
 #include "momentum.hpp"
-#include "variational.hpp"
+#include "schemes/variational.hpp"
 
 namespace hamelin::integration {
 

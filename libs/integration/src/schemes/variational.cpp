@@ -2,10 +2,10 @@
 
 #include <cmath>
 
+#include "channels/kernel_arguments.hpp"
 #include "finite.hpp"
 #include "hamelin/core/formatted.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
-#include "kernel_arguments.hpp"
 
 namespace hamelin::integration {
 

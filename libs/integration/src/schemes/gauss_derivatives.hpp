@@ -2,7 +2,7 @@
 #include <array>
 #include <vector>
 
-#include "force_derivatives.hpp"
+#include "channels/force_derivatives.hpp"
 #include "hamelin/dynamics/derivatives.hpp"
 #include "hamelin/integration/step_derivatives.hpp"
 #include "kernel/gauss.hpp"

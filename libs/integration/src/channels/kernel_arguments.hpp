@@ -33,19 +33,28 @@ inline void to_spins(const model::Model& model, std::span<const dynamics::Gyrosc
   }
 }
 
+/// The forces of each joint on its own in the form of the kernels: held torque, damping and dry
+/// friction.
+inline kernel::Forces joint_forces(const Channels& channels) noexcept {
+  return {data_or_null(channels.damping),
+          data_or_null(channels.coulomb),
+          data_or_null(channels.held_torque),
+          channels.coulomb_speed,
+          nullptr,
+          0};
+}
+
 /// The channels of a step in the form of the kernels. `spins` holds the gyroscopic terms, and
 /// `wrenches` those of this step; both must outlive the result.
 inline kernel::Forces to_forces(const model::Model& model, const Channels& channels,
                                 std::vector<dynamics::kernel::Spin>& spins,
                                 WrenchForces& wrenches) {
   to_spins(model, channels.gyroscopic, spins);
-  return {data_or_null(channels.damping),
-          data_or_null(channels.coulomb),
-          data_or_null(channels.held_torque),
-          channels.coulomb_speed,
-          spins.data(),
-          spins.size(),
-          wrenches.for_kernels()};
+  kernel::Forces forces = joint_forces(channels);
+  forces.spins = spins.data();
+  forces.spin_count = spins.size();
+  forces.external = wrenches.for_kernels();
+  return forces;
 }
 
 inline void report_work(const kernel::Work& work, StepReport& report) noexcept {

@@ -1,7 +1,7 @@
 #pragma once
 #include <array>
 
-#include "channel_forces.hpp"
+#include "channels/channel_forces.hpp"
 #include "hamelin/integration/integrator.hpp"
 
 namespace hamelin::integration {

@@ -2,7 +2,9 @@
 #include <Eigen/LU>
 #include <array>
 
+#include "channels/force_derivatives.hpp"
 #include "explicit.hpp"
+#include "hamelin/dynamics/derivatives.hpp"
 #include "step_controller.hpp"
 
 namespace hamelin::integration {
@@ -10,8 +12,8 @@ namespace hamelin::integration {
 /// RODAS of Hairer, Wanner (Solving Ordinary Differential Equations II, 2nd edition, 1996, IV.7,
 /// code rodas.f), docs/theory.md (7.12): a stiffly accurate Rosenbrock method of order 4 with six
 /// stages and an embedded one of order 3, for stiff forces and as a reference. Always under step
-/// control, with rtol = atol = 1e-10 unless set. The dense Jacobian comes from central differences
-/// of forward dynamics, once per step; as q̇ = v, the linear systems have size dof only.
+/// control, with rtol = atol = 1e-10 unless set. The Jacobian is exact except for wrench laws, and
+/// made once per step; as q̇ = v, the linear systems have size dof only.
 class Rosenbrock final : public Explicit {
  public:
   Rosenbrock(const Model& model, const RosenbrockOptions& options);
@@ -37,12 +39,15 @@ class Rosenbrock final : public Explicit {
   void solve_stage(std::size_t stage, const Channels& channels, double h, StepReport& report);
   [[nodiscard]] double error_norm(const State& state) const;
 
-  Eigen::MatrixXd by_q_, by_v_, matrix_;      ///< ∂a/∂q, ∂a/∂v, the matrix that is factored
+  dynamics::DerivativesWorkspace derivatives_;
+  ForceDerivatives forces_by_;
+  /// ∂a/∂q, ∂a/∂v, M⁻¹, the matrix that is factored
+  Eigen::MatrixXd by_q_, by_v_, inverse_mass_, matrix_;
   Eigen::Matrix4Xd works_by_q_, works_by_v_;  ///< ∂powers/∂(q, v)
   Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
   std::array<VectorXd, stages> dq_, dv_;  ///< the stages' increments
   std::array<Works, stages> dworks_;
-  VectorXd q_, v_, right_q_, right_v_, up_;
+  VectorXd q_, v_, right_q_, right_v_;
   Works works_;
 };
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "channels/kernel_arguments.hpp"
 #include "finite.hpp"
 #include "gauss_tableau.hpp"
 #include "hamelin/core/formatted.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
-#include "kernel_arguments.hpp"
 #include "state_owner.hpp"
 #include "step_controller.hpp"
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <variant>
 
-#include "channel_forces.hpp"
+#include "channels/channel_forces.hpp"
 #include "hamelin/dynamics/kernel/planar.hpp"
 #include "hamelin/dynamics/kernel/spatial.hpp"
 #include "hamelin/integration/integrator.hpp"

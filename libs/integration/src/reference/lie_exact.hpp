@@ -1,8 +1,8 @@
 #pragma once
 #include <variant>
 
-#include "channel_forces.hpp"
-#include "kernel/lie_exact.hpp"
+#include "channels/channel_forces.hpp"
+#include "lie_exact_sweeps.hpp"
 #include "momentum.hpp"
 
 namespace hamelin::integration {
