@@ -8,6 +8,7 @@
 #include "hamelin/control/world.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/dynamics/frames.hpp"
 #include "hamelin/scene/payload.hpp"
 #include "hamelin/sensing/depth_camera.hpp"
 #include "hamelin/test/errors.hpp"

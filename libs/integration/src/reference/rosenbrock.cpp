@@ -71,7 +71,7 @@ Rosenbrock::Works Rosenbrock::derivative(const Channels& channels, const VectorX
   return {power.gyroscopic_work_J, power.dissipated_J, power.held_work_J, power.external_work_J};
 }
 
-// docs/theory.md (7.20): gyroscopic terms have no power anywhere.
+// docs/theory.md (7.17): gyroscopic terms have no power anywhere.
 void Rosenbrock::make_jacobian(const State& state, const Channels& channels, StepReport& report) {
   forces_by_.evaluate(model_, channels, ws_, state.q, state.v, *wrenches_);
   dynamics::forward_dynamics_derivatives(model_, derivatives_, state.q, state.v, forces_by_.force,
