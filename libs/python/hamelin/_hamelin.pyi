@@ -621,6 +621,7 @@ class World:
         *,
         time: float,
         mount: str = ...,
+        frame: str | None = ...,
         source: int = ...,
         range: float = ...,
     ) -> dict[str, int]: ...
