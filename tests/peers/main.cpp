@@ -438,10 +438,12 @@ int run(int argc, char** argv) {
   if (const char* isa = std::getenv("HAMELIN_ISA"))
     set_default_isa(isa_from_name(isa, "HAMELIN_ISA"));
   const auto wanted = [&](const char* part) { return parts.empty() || parts.count(part) != 0; };
-  std::vector<std::string> names;
-  for (const auto& peer : make_all(chain(1, "x"))) names.push_back(peer->name());
-  fmt::print("# {}; ISA {}\n", fmt::join(names, ", "), name_of(default_isa()));
-  Json out{{"peers", names}, {"isa", name_of(default_isa())}, {"quick", quick}};
+  Json sets = Json::object();
+  for (const auto& peer : make_all(chain(1, "x"))) {
+    sets[peer->name()] = peer->instruction_set();
+    fmt::print("# {}: instruction set {}\n", peer->name(), peer->instruction_set());
+  }
+  Json out{{"instruction_sets", sets}, {"quick", quick}};
   if (wanted("speed")) out["speed"] = speed(quick);
   if (wanted("energy")) out["energy"] = energy(quick);
   if (wanted("precision")) out["precision"] = precision(quick);

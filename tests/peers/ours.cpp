@@ -25,6 +25,9 @@ class Ours final : public Peer {
  public:
   explicit Ours(const model::Robot& robot) : model_(robot), ws_(model_) {}
   [[nodiscard]] std::string name() const override { return "hamelin"; }
+  [[nodiscard]] std::string instruction_set() const override {
+    return std::string(name_of(default_isa()));
+  }
   void inverse_dynamics(const VectorXd& q, const VectorXd& v, const VectorXd& a,
                         VectorXd& tau) override {
     dynamics::inverse_dynamics(model_, ws_, q, v, a, tau);

@@ -30,6 +30,9 @@ class Peer {
  public:
   virtual ~Peer() = default;
   [[nodiscard]] virtual std::string name() const = 0;
+  /// The instruction set of its code: that of the flags of this build for what is compiled here,
+  /// which are those of the baseline; that of a package is its packager's choice.
+  [[nodiscard]] virtual std::string instruction_set() const { return "as packaged"; }
   virtual void inverse_dynamics(const VectorXd& q, const VectorXd& v, const VectorXd& a,
                                 VectorXd& tau) = 0;
   virtual void forward_dynamics(const VectorXd& q, const VectorXd& v, const VectorXd& tau,
@@ -66,6 +69,7 @@ inline Eigen::Matrix3d inertia_in_base_axes(const model::Link& link) {
 [[nodiscard]] std::unique_ptr<Peer> make_mujoco(const model::Robot& robot);
 [[nodiscard]] std::unique_ptr<Peer> make_dart(const model::Robot& robot);
 [[nodiscard]] std::unique_ptr<Peer> make_kdl(const model::Robot& robot);
+[[nodiscard]] std::unique_ptr<Peer> make_pinocchio(const model::Robot& robot);
 
 /// hamelin first, then each peer that was found when this program was built.
 [[nodiscard]] inline std::vector<std::unique_ptr<Peer>> make_all(const model::Robot& robot) {
@@ -76,6 +80,9 @@ inline Eigen::Matrix3d inertia_in_base_axes(const model::Link& link) {
 #endif
 #ifdef HAMELIN_WITH_DART
   all.push_back(make_dart(robot));
+#endif
+#ifdef HAMELIN_WITH_PINOCCHIO
+  all.push_back(make_pinocchio(robot));
 #endif
 #ifdef HAMELIN_WITH_KDL
   all.push_back(make_kdl(robot));

@@ -304,14 +304,17 @@ TEST_CASE("a ball that moves becomes an obstacle with its velocity, and the map 
   CHECK(room.distance(center(time_s - 1.0)) > 0.2);
 }
 
-TEST_CASE("a sensor on the tip sees from where the tip was", "[control][points]") {
+TEST_CASE("a sensor on a frame of the arm sees from where the frame was", "[control][points]") {
   Room room;
   room.scene.map->points.margin_m = 0.0;
   room.make();
+  const std::string name = GENERATE(as<std::string>(), "the tip", "panda_link5", "panda_link0");
+  CAPTURE(name);
   dynamics::Workspace ws(room.arm);
   VectorXd q = room.scene.start_q;
   dynamics::forward_kinematics(room.arm, ws, q);
-  const Vector3d seen = dynamics::tip_pose(room.arm, ws) * Vector3d(0.0, 0.0, 0.3);
+  const int at = name == "the tip" ? model::Model::tip_frame : room.arm.frame(name);
+  const Vector3d seen = dynamics::frame_pose(room.arm, ws, at) * Vector3d(0.0, 0.0, 0.3);
   for (int k = 0; k <= 100; ++k) {
     room.world->note_posture(0.001 * k, q, 0);
     q[0] += 0.01;
@@ -319,7 +322,8 @@ TEST_CASE("a sensor on the tip sees from where the tip was", "[control][points]"
   control::PointFrame frame;
   frame.points = Eigen::Vector3f(0.0F, 0.0F, 0.25F);
   frame.sensor = {Eigen::Matrix3d::Identity(), {0.0, 0.0, 0.05}};
-  frame.mount = scene::Mount::tip;
+  frame.mount = name == "the tip" ? scene::Mount::tip : scene::Mount::frame;
+  if (name != "the tip") frame.frame = name;
   CHECK(room.world->insert_points(frame).occupied == 1);
   CHECK(room.distance(seen) < 0.0);
 }
@@ -333,6 +337,10 @@ TEST_CASE("frames that make no sense are refused in one line, and the world is u
   };
   const double nan = std::nan("");
   control::PointFrame frame = wall_at(0.6);
+  frame.mount = scene::Mount::frame;
+  frame.frame = "panda_link55";
+  refused(frame, "points: the sensor's mount: no frame 'panda_link55'");
+  frame = wall_at(0.6);
   frame.points(1, 7) = std::nanf("");
   refused(frame, "points: one is not finite");
   frame.points.resize(3, 0);

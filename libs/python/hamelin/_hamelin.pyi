@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, Literal, Sequence
+from typing import Any, Callable, Iterable, Literal, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,8 @@ NumberOrArray = Any
 
 #: In which terms a twist of a frame is given.
 Reference = Literal["world", "local", "local_world_aligned"]
+#: An event's value at (time_s, q, v).
+EventFunction = Callable[[float, Array, Array], float]
 
 __version__: str
 _planner_plugin: Any
@@ -269,6 +271,23 @@ class Integrator:
         on_step: Callable[[State, StepReport], Any] | None = ...,
     ) -> dict[str, Any]: ...
     def __repr__(self) -> str: ...
+
+class EventFinder:
+    def __init__(
+        self,
+        integrator: Integrator,
+        events: Iterable[EventFunction | tuple[EventFunction, int]],
+        *,
+        samples: int = ...,
+        tolerance_s: float = ...,
+    ) -> None: ...
+    def step(
+        self,
+        state: State,
+        step: float,
+        channels: Channels | None = ...,
+    ) -> tuple[StepReport, int | None]: ...
+    def motion(self, time_s: float) -> tuple[Array, Array]: ...
 
 class LogStream:
     def __init__(self, file: PathLike) -> None: ...
@@ -602,6 +621,7 @@ class World:
         *,
         time: float,
         mount: str = ...,
+        frame: str | None = ...,
         source: int = ...,
         range: float = ...,
     ) -> dict[str, int]: ...

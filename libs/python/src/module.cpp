@@ -90,6 +90,7 @@ PYBIND11_MODULE(_hamelin, module) {
   python::add_models(module);
   python::add_robot_files(module);
   python::add_integrators(module);
+  python::add_events(module);
   python::add_scenes(module);
   python::add_runs(module);
   python::add_logs(module);

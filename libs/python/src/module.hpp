@@ -12,6 +12,7 @@ namespace py = pybind11;
 void add_models(py::module_& module);
 void add_robot_files(py::module_& module);
 void add_integrators(py::module_& module);
+void add_events(py::module_& module);
 void add_scenes(py::module_& module);
 void add_runs(py::module_& module);
 void add_logs(py::module_& module);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <optional>
+#include <string>
 
 #include "bound_controller.hpp"
 #include "hamelin/core/error.hpp"
@@ -20,7 +22,8 @@ const std::filesystem::path& folder_of(const BoundWorld& w) {
 using PointArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
 
 control::PointFrame frame_of(const PointArray& points, py::handle pose, double time_s,
-                             const std::string& mount, double range_m) {
+                             const std::string& mount, const std::optional<std::string>& frame_name,
+                             double range_m) {
   if (points.ndim() != 2 || points.shape(1) != 3)
     throw Error(ErrorCode::usage, "insert_points: points: expected an array of shape (N, 3)");
   control::PointFrame frame;
@@ -28,6 +31,13 @@ control::PointFrame frame_of(const PointArray& points, py::handle pose, double t
   frame.sensor = pose_of("insert_points", "pose", pose);
   frame.time_s = time_s;
   frame.range_m = range_m;
+  if (frame_name) {
+    if (mount != "world")
+      throw Error(ErrorCode::usage, "insert_points: mount and frame given, expected one of them");
+    frame.mount = scene::Mount::frame;
+    frame.frame = *frame_name;
+    return frame;
+  }
   constexpr std::array mounts{scene::Mount::world, scene::Mount::base, scene::Mount::tip};
   const auto* const found = std::find_if(
       mounts.begin(), mounts.end(), [&](scene::Mount m) { return scene::to_string(m) == mount; });
@@ -125,8 +135,9 @@ void add_world(py::module_& module) {
       .def(
           "insert_points",
           [](const BoundWorld& w, const PointArray& points, py::handle pose, double time_s,
-             const std::string& mount, std::int32_t source, double range_m) {
-            control::PointFrame frame = frame_of(points, pose, time_s, mount, range_m);
+             const std::string& mount, const std::optional<std::string>& frame_name,
+             std::int32_t source, double range_m) {
+            control::PointFrame frame = frame_of(points, pose, time_s, mount, frame_name, range_m);
             frame.source = source;
             control::FrameReport report;
             {
@@ -144,12 +155,14 @@ void add_world(py::module_& module) {
             return out;
           },
           arg("points"), arg("pose"), py::kw_only(), arg("time"), arg("mount") = "world",
-          arg("source") = 0, arg("range") = std::numeric_limits<double>::infinity(),
+          arg("frame") = py::none(), arg("source") = 0,
+          arg("range") = std::numeric_limits<double>::infinity(),
           "Makes what a depth sensor saw part of the map, which must exist. points: shape (N, 3),\n"
           "in the sensor's frame, finite [m]. pose: of the sensor in the frame of its mount,\n"
-          "\"world\", \"base\" or \"tip\", shape (4, 4). time: when they were seen [s]. source:\n"
+          "\"world\", \"base\" or \"tip\", or in the robot's frame of that name, shape (4, 4). "
+          "time: when they were seen [s]. source:\n"
           "the same for all frames of a sensor. range: of points that are farther only the way up\n"
-          "to there is free [m]. PointArray on the arm, its load or a known obstacle are left out, "
+          "to there is free [m]. Points on the arm, its load or a known obstacle are left out, "
           "rays\n"
           "to the others free what they pass, and bodies that move become obstacles.\n"
           "Returns the number of the snapshot that knows the frame, and counts of points and\n"

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/hermite.hpp"
 
 namespace hamelin::scene {
 
@@ -91,24 +92,12 @@ Index JointTrajectory::at(double time, VectorXd& out_q, VectorXd& out_v, VectorX
   const double h = time_s[i] - time_s[j], s = (time - time_s[j]) / h;
   const bool quintic = a.cols() > 0;
   for (Index k = 0; k < q.rows(); ++k) {
-    // docs/theory.md (18.14), (18.15), as q_j + s (c1 + s (c2 + …))
-    const double c1 = h * v(k, j), dv = h * v(k, i) - c1;
-    double c2 = 0.0, c3 = 0.0, c4 = 0.0, c5 = 0.0;
-    if (quintic) {
-      c2 = 0.5 * h * h * a(k, j);
-      const double dq = q(k, i) - q(k, j) - c1 - c2, slope = dv - 2.0 * c2,
-                   bend = 0.5 * h * h * (a(k, i) - a(k, j));
-      c3 = 10.0 * dq - 4.0 * slope + bend;
-      c4 = -15.0 * dq + 7.0 * slope - 2.0 * bend;
-      c5 = 6.0 * dq - 3.0 * slope + bend;
-    } else {
-      const double dq = q(k, i) - q(k, j) - c1;
-      c2 = 3.0 * dq - dv;
-      c3 = dv - 2.0 * dq;
-    }
-    out_q[k] = q(k, j) + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))));
-    out_v[k] = (c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))) / h;
-    out_a[k] = (2.0 * c2 + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5))) / (h * h);
+    const Hermite part =
+        quintic ? Hermite::quintic(h, q(k, j), v(k, j), a(k, j), q(k, i), v(k, i), a(k, i))
+                : Hermite::cubic(h, q(k, j), v(k, j), q(k, i), v(k, i));
+    out_q[k] = part.position(s);
+    out_v[k] = part.velocity(s);
+    out_a[k] = part.acceleration(s);
   }
   return j;
 }

@@ -32,6 +32,8 @@ std::string_view to_string(Mount mount) noexcept {
       return "base";
     case Mount::tip:
       return "tip";
+    case Mount::frame:
+      return "frame";
   }
   return "unknown";
 }

@@ -368,7 +368,14 @@ std::vector<SensorSpec> read_sensors(const Reader& in, const Scene& scene) {
     SensorSpec sensor;
     sensor.name = given.get<std::string>("name", fmt::format("camera {}", out.size() + 1));
     const auto mount = given.get<std::string>("mount", "world");
-    sensor.mount = mount == "tip" ? Mount::tip : mount == "base" ? Mount::base : Mount::world;
+    sensor.mount = mount == "tip"     ? Mount::tip
+                   : mount == "base"  ? Mount::base
+                   : mount == "frame" ? Mount::frame
+                                      : Mount::world;
+    sensor.frame = given.get<std::string>("frame", "");
+    if ((sensor.mount == Mount::frame) == sensor.frame.empty())
+      given.fail("frame", sensor.frame.empty() ? "is not given, expected one with mount \"frame\""
+                                               : "is given, expected mount \"frame\" with it");
     sensor.pose = given.pose();
     sensor.quaternion_wxyz = given.quaternion();
     if (const auto size = given.get<std::vector<int>>("size", {}); !size.empty()) {

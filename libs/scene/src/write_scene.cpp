@@ -67,6 +67,7 @@ Json map_json(const MapSpec& map) {
 
 Json sensor_json(const SensorSpec& sensor) {
   Json out{{"type", "depth"}, {"name", sensor.name}, {"mount", to_string(sensor.mount)}};
+  if (sensor.mount == Mount::frame) out["frame"] = sensor.frame;
   out.update(pose_json(sensor.pose, sensor.quaternion_wxyz));
   out["fov_rad"] = sensor.fov_rad;
   out["size"] = {sensor.width, sensor.height};

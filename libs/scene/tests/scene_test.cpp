@@ -385,7 +385,8 @@ TEST_CASE("maps that sensors make, and sensors, are read and read back", "[scene
                           {"position_m", {0.0, 0.1, 0.05}},
                           {"size", {32, 24}},
                           {"rate_hz", 5.0}},
-                         {{"type", "depth"}, {"name", "beside"}}};
+                         {{"type", "depth"}, {"name", "beside"}},
+                         {{"type", "depth"}, {"mount", "frame"}, {"frame", "wrist"}}};
   const auto read = [&] { return scene_from_json(document, ".", "x.json"); };
   const auto check_read = [](const Scene& scene) {
     REQUIRE(scene.map);
@@ -393,7 +394,7 @@ TEST_CASE("maps that sensors make, and sensors, are read and read back", "[scene
     CHECK(scene.map->resolution_m == 0.02);
     CHECK(scene.map->points.margin_m == 0.01);
     CHECK(scene.map->points.most == 0.75);
-    REQUIRE(scene.sensors.size() == 2);
+    REQUIRE(scene.sensors.size() == 3);
     CHECK(scene.sensors[0].name == "camera 1");
     CHECK(scene.sensors[0].mount == Mount::tip);
     CHECK(scene.sensors[0].pose.p().y() == 0.1);
@@ -401,10 +402,17 @@ TEST_CASE("maps that sensors make, and sensors, are read and read back", "[scene
     CHECK(scene.sensors[0].rate_hz == 5.0);
     CHECK(scene.sensors[1].name == "beside");
     CHECK(scene.sensors[1].mount == Mount::world);
+    CHECK(scene.sensors[2].mount == Mount::frame);
+    CHECK(scene.sensors[2].frame == "wrist");
     CHECK(input_files(scene).size() == 1);
   };
   check_read(read());
   check_read(scene_from_json(resolved_json(read()), ".", "x.json"));
+  document["sensors"][2].erase("frame");
+  CHECK_THROWS_WITH(read(), Catch::Contains("/sensors/2/frame: is not given, expected one with"));
+  document["sensors"][2] = {{"type", "depth"}, {"frame", "wrist"}};
+  CHECK_THROWS_WITH(read(), Catch::Contains("/sensors/2/frame: is given, expected mount"));
+  document["sensors"].erase(2);
   document["map"]["points"]["least"] = 0.45;
   document["map"]["points"]["most"] = 0.5;
   CHECK(read().map->points.least == 0.45);

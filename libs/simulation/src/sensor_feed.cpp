@@ -1,10 +1,13 @@
 #include "sensor_feed.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/dynamics/frames.hpp"
 
 namespace hamelin::simulation {
 
@@ -14,6 +17,16 @@ constexpr double time_rounding_s = 1e-9;
 // Noise of other parts of a run comes from the seed itself.
 constexpr std::uint64_t noise_stream = 0x5e2501;
 
+// The index of a camera's frame; 0 without one.
+int frame_of(const scene::SensorSpec& spec, const model::Model& model, const std::string& place) {
+  if (spec.mount != scene::Mount::frame) return 0;
+  try {
+    return model.frame(spec.frame);
+  } catch (const Error& e) {
+    throw Error(ErrorCode::invalid, fmt::format("{}: {}", place, e.what()));
+  }
+}
+
 }  // namespace
 
 SensorFeed::SensorFeed(const scene::Scene& scene, const model::Model& model)
@@ -22,8 +35,11 @@ SensorFeed::SensorFeed(const scene::Scene& scene, const model::Model& model)
       sees_map_(std::none_of(scene.obstacles.begin(), scene.obstacles.end(),
                              [](const auto& o) { return o.judge_only; })) {
   for (const scene::SensorSpec& spec : scene.sensors)
-    cameras_.push_back({spec, sensing::DepthRenderer({spec.width, spec.height, spec.fov_rad,
-                                                      spec.range_m, spec.noise_m})});
+    cameras_.push_back(
+        {spec,
+         frame_of(spec, model, fmt::format("{}: /sensors/{}/frame", scene.name, cameras_.size())),
+         sensing::DepthRenderer(
+             {spec.width, spec.height, spec.fov_rad, spec.range_m, spec.noise_m})});
 }
 
 void SensorFeed::see_solids(double time_s, control::WorldView& truth) {
@@ -39,6 +55,7 @@ control::PointFrame SensorFeed::look(Camera& camera, double time_s, control::Wor
   control::PointFrame frame;
   frame.sensor = camera.spec.pose;
   frame.mount = camera.spec.mount;
+  frame.frame = camera.spec.frame;
   frame.source = static_cast<std::int32_t>(&camera - cameras_.data());
   frame.time_s = time_s;
   frame.range_m = camera.spec.range_m;
@@ -47,6 +64,8 @@ control::PointFrame SensorFeed::look(Camera& camera, double time_s, control::Wor
     pose = dynamics::tip_pose(model_, truth.poses()) * pose;
   else if (camera.spec.mount == scene::Mount::base)
     pose = model_.base() * pose;
+  else if (camera.spec.mount == scene::Mount::frame)
+    pose = dynamics::frame_pose(model_, truth.poses(), camera.frame) * pose;
   frame.points = camera.renderer.render(pose, solids_, noise_);
   return frame;
 }

@@ -39,6 +39,7 @@ class SensorFeed {
  private:
   struct Camera {
     scene::SensorSpec spec;
+    int frame = 0;  ///< index in Model::frames() of Mount::frame
     sensing::DepthRenderer renderer;
     long frames = 0;
   };

@@ -271,8 +271,15 @@ TEST_CASE("points from C become part of the map, and what makes no sense is refu
   CHECK(report.points + report.on_arm == 2);
   CHECK(report.points == report.occupied);
   CHECK(report.on_obstacles == 0);
-  frame.mount = 3;
+  frame.mount = 4;
   CHECK_THAT(loop.failure(insert()), Contains("the sensor's mount is unknown"));
+  frame.mount = HAMELIN_MOUNT_FRAME;
+  CHECK_THAT(loop.failure(insert()), Contains("frame: frame: is null"));
+  frame.frame = "none";
+  CHECK_THAT(loop.failure(insert()), Contains("the sensor's mount: no frame 'none'"));
+  frame.struct_size = offsetof(hamelin_point_frame, frame);  // of an older header
+  CHECK_THAT(loop.failure(insert()), Contains("frame: frame: is null"));
+  frame.struct_size = sizeof frame;
   frame.mount = HAMELIN_MOUNT_TIP;
   loop.require(insert());
   frame.points = 3'000'000;

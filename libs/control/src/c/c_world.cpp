@@ -35,18 +35,20 @@ scene::Obstacle obstacle_of(const hamelin_obstacle& given) {
 }
 
 PointFrame frame_of(const hamelin_point_frame* given) {
-  const hamelin_point_frame full = complete(given, sizeof(hamelin_point_frame), "frame");
+  const hamelin_point_frame full = complete(given, offsetof(hamelin_point_frame, frame), "frame");
   if (full.points > static_cast<std::size_t>(PointFrame::points_max))
     throw Error(ErrorCode::invalid, fmt::format("points: {} given, expected 1 to {}", full.points,
                                                 PointFrame::points_max));
-  if (full.mount < HAMELIN_MOUNT_WORLD || full.mount > HAMELIN_MOUNT_TIP)
+  if (full.mount < HAMELIN_MOUNT_WORLD || full.mount > HAMELIN_MOUNT_FRAME)
     throw Error(ErrorCode::invalid,
-                "points: the sensor's mount is unknown, expected the world, the base or the tip");
+                "points: the sensor's mount is unknown, expected the world, the base, the tip or a "
+                "frame");
   PointFrame out;
   out.points = Eigen::Map<const Eigen::Matrix3Xf>(required(full.points_m, "frame: points_m"), 3,
                                                   static_cast<Eigen::Index>(full.points));
   out.sensor = pose_of(full.position_m, full.quaternion_wxyz);
   out.mount = static_cast<scene::Mount>(full.mount);
+  if (out.mount == scene::Mount::frame) out.frame = required(full.frame, "frame: frame");
   out.source = full.source;
   out.time_s = full.time_s;
   if (full.range_m != 0.0) out.range_m = full.range_m;

@@ -3,11 +3,13 @@
 
 #include <cmath>
 #include <functional>
+#include <string>
 #include <utility>
 
 #include "hamelin/control/world.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/dynamics/frames.hpp"
 #include "hamelin/sensing/self_filter.hpp"
 #include "world/posture_history.hpp"
 #include "world/sensed_map.hpp"
@@ -36,18 +38,28 @@ void transform(const geometry::SE3& pose, Matrix3Xf& points) {
   points = ((R * points).colwise() + p).eval();
 }
 
+int frame_index(const PointFrame& seen, const model::Model& model) {
+  try {
+    return model.frame(seen.frame);
+  } catch (const Error& e) {
+    refuse(std::string("the sensor's mount: ") + e.what());
+  }
+}
+
 // Pose in the world of what carries the sensor, after dynamics::forward_kinematics.
-geometry::SE3 mount_of(scene::Mount mount, const model::Model& model,
+geometry::SE3 mount_of(const PointFrame& seen, const model::Model& model,
                        const dynamics::Workspace& ws) {
-  switch (mount) {
+  switch (seen.mount) {
     case scene::Mount::world:
       return {};
     case scene::Mount::base:
       return model.base();
     case scene::Mount::tip:
       return dynamics::tip_pose(model, ws);
+    case scene::Mount::frame:
+      return dynamics::frame_pose(model, ws, frame_index(seen, model));
   }
-  refuse("the sensor's mount is unknown, expected the world, the base or the tip");
+  refuse("the sensor's mount is unknown, expected the world, the base, the tip or a frame");
 }
 
 // Moves points that are not on the arm, in none of its postures, to the front: docs/theory.md
@@ -171,7 +183,7 @@ World::SeenPoints World::seen_points(const PointFrame& frame,
   const model::Model& model = *seen.model;
   dynamics::Workspace ws(model);
   dynamics::forward_kinematics(model, ws, seen.postures.front());
-  SeenPoints out{mount_of(frame.mount, model, ws) * frame.sensor, frame.points, {}};
+  SeenPoints out{mount_of(frame, model, ws) * frame.sensor, frame.points, {}};
   transform(out.sensor, out.points);
   const auto keep = [&](Eigen::Index kept) {
     const Eigen::Index removed = out.points.cols() - kept;

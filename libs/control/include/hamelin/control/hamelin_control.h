@@ -231,7 +231,12 @@ typedef struct hamelin_observation {
 } hamelin_observation;
 
 /* What carries a depth sensor. */
-enum { HAMELIN_MOUNT_WORLD = 0, HAMELIN_MOUNT_BASE = 1, HAMELIN_MOUNT_TIP = 2 };
+enum {
+  HAMELIN_MOUNT_WORLD = 0,
+  HAMELIN_MOUNT_BASE = 1,
+  HAMELIN_MOUNT_TIP = 2,
+  HAMELIN_MOUNT_FRAME = 3
+};
 
 /* What a depth sensor saw at one time. */
 typedef struct hamelin_point_frame {
@@ -243,6 +248,7 @@ typedef struct hamelin_point_frame {
   double position_m[3], quaternion_wxyz[4]; /* of the sensor, in the frame of its mount */
   double time_s;  /* when they were seen, on the clock of hamelin_controller_tick */
   double range_m; /* of points that are farther only the way up to there is free; 0: no bound */
+  const char* frame; /* HAMELIN_MOUNT_FRAME: name of a link or fixed frame of the robot */
 } hamelin_point_frame;
 
 /* What a frame changed. */

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <string>
 
 #include "hamelin/geometry/se3.hpp"
 #include "hamelin/scene/map_change.hpp"
@@ -18,6 +19,7 @@ struct PointFrame {
   Eigen::Matrix3Xf points;  ///< 3 × N in the sensor's frame [m], finite
   geometry::SE3 sensor;     ///< pose of the sensor's frame in that of its mount
   scene::Mount mount = scene::Mount::world;
+  std::string frame;        ///< name in Model::frames(), of Mount::frame
   std::int32_t source = 0;  ///< the same for all frames of a sensor, another for each sensor
   double time_s = 0.0;      ///< when they were seen, on the clock of Controller::tick()
   /// Of points that are farther only the way up to there is free [m].
@@ -36,7 +38,7 @@ struct FrameReport {
 };
 
 /// @throws Error invalid, "points: …", for no point, more than points_max, numbers that are not
-///         finite, a range that is not above 0
+///         finite, a range that is not above 0. World::insert_points refuses an unknown frame, too.
 void check(const PointFrame& frame);
 
 }  // namespace hamelin::control

@@ -8,8 +8,9 @@
 
 namespace hamelin::scene {
 
-/// What carries a depth sensor: the world, the robot's base, which stands in it, or the tip.
-enum class Mount : std::int32_t { world, base, tip };
+/// What carries a depth sensor: the world, the robot's base, which stands in it, the tip, or a frame
+/// with a name.
+enum class Mount : std::int32_t { world, base, tip, frame };
 
 [[nodiscard]] std::string_view to_string(Mount mount) noexcept;
 
@@ -18,6 +19,7 @@ enum class Mount : std::int32_t { world, base, tip };
 struct SensorSpec {
   std::string name;
   Mount mount = Mount::world;
+  std::string frame;                               ///< name in Model::frames(), of Mount::frame
   geometry::SE3 pose;                              ///< in the frame of its mount
   Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};  ///< see Quaternion
   double fov_rad = 1.0;                            ///< horizontal
