@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <Eigen/LU>
+
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <ctime>
@@ -7,6 +9,7 @@
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/integration/step_derivatives.hpp"
 #include "hamelin/model/make_chain.hpp"
+#include "linear_system.hpp"
 
 using namespace hamelin;
 using namespace hamelin::integration;
@@ -56,5 +59,31 @@ TEST_CASE("what the derivatives of a step cost", "[!benchmark][integration]") {
       fmt::print("{:<22}{:>6}{:>10.2f}{:>16.2f}{:>10.1f}{:>20.1f}\n", scheme, n, step, derivatives,
                  derivatives / step, (3 * n + 1) * step);
     }
+  }
+}
+
+TEST_CASE("small dense equations, ours and Eigen's", "[!benchmark][integration]") {
+  // Of the sizes that derivatives of steps have: n joints times stages, 2n + 1 or 3n columns.
+  fmt::print("{:>6}{:>10}{:>14}{:>14}{:>12}\n", "size", "columns", "baseline, us", "default, us",
+             "Eigen, us");
+  for (const auto& [n, columns] : {std::pair<int, int>{7, 15}, {14, 21}, {28, 21}, {56, 21}}) {
+    const Eigen::MatrixXd S = Eigen::MatrixXd::Random(n, n) + n * Eigen::MatrixXd::Identity(n, n),
+                          R = Eigen::MatrixXd::Random(n, columns);
+    const auto ours = [&, n = n, columns = columns](Isa isa) {
+      LinearSystem system(n, columns, isa);
+      return least_us([&] {
+        system.matrix() = S;
+        system.right() = R;
+        REQUIRE(system.solve());
+      });
+    };
+    Eigen::PartialPivLU<Eigen::MatrixXd> factors(n);
+    Eigen::MatrixXd X(n, columns);
+    const double eigen = least_us([&] {
+      factors.compute(S);
+      X = factors.solve(R);
+    });
+    fmt::print("{:>6}{:>10}{:>14.2f}{:>14.2f}{:>12.2f}\n", n, columns, ours(Isa::baseline),
+               ours(default_isa()), eigen);
   }
 }
