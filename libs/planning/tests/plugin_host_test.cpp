@@ -219,6 +219,8 @@ TEST_CASE("the setup passes the nominal model to the plugin", "[planning][plugin
   model::Robot robot = test::random_robot(3, 4, 2);
   robot.links[2].segments = {{{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}, 0.0},
                              {{0.0, 0.1, -0.1}, {0.0, 0.3, 0.1}, 0.03}};
+  const geometry::SE3 flange_pose(robot.links[1].com.R(), {0.1, 0.2, 0.3});
+  robot.frames = {{"flange", 1, flange_pose}, {"stand", -1, {}}};
   const model::Model model(std::move(robot), base, {0.0, 1.0, -9.0});
   SetupData data(model);
   data.q_lower = Eigen::Vector4d::Constant(-2.0);
@@ -230,6 +232,12 @@ TEST_CASE("the setup passes the nominal model to the plugin", "[planning][plugin
   const model::Model back = setup.model();
   CHECK(back.dof() == 4);
   CHECK(back.gravity() == model.gravity());
+  const auto& flange = back.frames()[static_cast<std::size_t>(back.frame("flange"))];
+  CHECK(flange.link == 1);
+  CHECK((flange.in_link.matrix() -
+         model.frames()[static_cast<std::size_t>(model.frame("flange"))].in_link.matrix())
+            .norm() < 1e-15);
+  CHECK(back.frames()[static_cast<std::size_t>(back.frame("stand"))].link == -1);
   CHECK((back.base().matrix() - base.matrix()).norm() < 1e-15);
   CHECK(setup.goals()[0].q[3] == 4.0);
   CHECK(setup.q_lower()->minCoeff() == -2.0);
