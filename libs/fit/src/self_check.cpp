@@ -314,7 +314,7 @@ Json to_json(const SelfCheck& check, const model::Robot& robot) {
           {"links_without_shapes", check.links_without_shapes},
           {"odd_limits", check.suspicious_limits},
           {"notes", robot.notes},
-          {"warnings", model::warnings(robot)}};
+          {"warnings", robot.warnings}};
 }
 
 }  // namespace hamelin::fit
