@@ -57,14 +57,14 @@ std::shared_ptr<BoundFinder> make_finder(const std::shared_ptr<BoundIntegrator>&
                                        integration::EventSettings{samples, tolerance_s});
 }
 
-py::tuple step(BoundFinder& bound, PyState& state, double h, const PyChannels* channels) {
+py::tuple step_to_event(BoundFinder& bound, PyState& state, double h, const PyChannels* channels) {
   const Use use(*bound.integrator);
   const auto taken = bound.finder.step(state, given_or_none(channels), h);
   return py::make_tuple(boxed(taken.step),
                         taken.event < 0 ? py::object(py::none()) : py::int_(taken.event));
 }
 
-py::tuple motion(const BoundFinder& bound, double time_s) {
+py::tuple motion_within(const BoundFinder& bound, double time_s) {
   const Eigen::Index dof = bound.integrator->model->model.dof();
   Eigen::VectorXd q(dof), v(dof);
   bound.finder.motion().at(time_s, q, v);
@@ -84,11 +84,11 @@ void add_events(py::module_& module) {
            "direction of 1 means only from negative to positive, -1 the reverse, 0 both.\n"
            "samples: per step; signs that change twice between two of them are not seen.\n"
            "tolerance_s: by how much the state may be later than the event.")
-      .def("step", &step, arg("state"), arg("step"), arg("channels") = py::none(),
+      .def("step", &step_to_event, arg("state"), arg("step"), arg("channels") = py::none(),
            "Advances the state by `step` [s], or to the first event within it, in place.\n\n"
            "Returns (StepReport, index of the event or None). The state at an event is one of the\n"
            "scheme; the next step does not find the event again.")
-      .def("motion", &motion, arg("time_s"),
+      .def("motion", &motion_within, arg("time_s"),
            "(q, v) at a time within the last step, by the polynomial of degree five through\n"
            "positions, velocities and accelerations at both nodes.");
 }
