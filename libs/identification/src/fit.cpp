@@ -24,11 +24,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double still_speed_rms = 1e-3;    // [rad/s or m/s]
-constexpr double sigma_first = 0.1;         // of the torque, before there are residuals
-constexpr double sigma_least = 1e-7;        // of the torque, for data without noise
+constexpr double still_speed_rms = 1e-3;  // [rad/s or m/s]
+constexpr double sigma_first = 0.1;       // of the torque, before there are residuals
+constexpr double sigma_least = 1e-7;      // of the torque, for data without noise
 constexpr int passes_max = 10;
-constexpr Index samples_per_block = 20;     // residuals of other blocks are independent
+constexpr Index samples_per_block = 20;  // residuals of other blocks are independent
 
 double root_mean_square(const VectorXd& x) {
   return x.size() == 0 ? 0.0 : std::sqrt(x.squaredNorm() / static_cast<double>(x.size()));
@@ -109,8 +109,7 @@ Objective::Equations equations_of(const Coordinates& coordinates, const Samples:
   MatrixXd all(joint.A.rows(), coordinates.size() + 1);
   all.leftCols(coordinates.inertial()) = coordinates.on_links(joint.A);
   all.rightCols(1 + 2 * static_cast<Index>(coordinates.moving.size())).setZero();
-  all.rightCols<1>() =
-      joint.b - joint.A.leftCols(inertial_columns) * coordinates.prior.inertial;
+  all.rightCols<1>() = joint.b - joint.A.leftCols(inertial_columns) * coordinates.prior.inertial;
   const auto found = std::find(coordinates.moving.begin(), coordinates.moving.end(), j);
   if (found == coordinates.moving.end()) {
     all.rightCols<1>() -= joint.A.col(inertial_columns) * coordinates.prior.damping[j] +
@@ -201,7 +200,7 @@ class WeightedFit {
 };
 
 // Standard errors by sums over blocks of neighbouring samples, which hold for residuals that are
-// correlated within a block: White (1984).
+// correlated within a block: Liang, Zeger (1986).
 void set_errors(const Coordinates& coordinates, const WeightedFit& weighted, const Samples& samples,
                 Fit& out) {
   const Index size = coordinates.size(), rows = samples.rows();
@@ -285,9 +284,9 @@ void set_excitation(const model::Model& model, const Coordinates& coordinates,
     scaled += square / torque;
   }
   const VectorXd known = Eigen::SelfAdjointEigenSolver<MatrixXd>(information).eigenvalues();
-  out.determined = std::min(
-      out.base_parameters,
-      static_cast<int>((known.array() > weighted.objective().prior_weight).count()));
+  out.determined =
+      std::min(out.base_parameters,
+               static_cast<int>((known.array() > weighted.objective().prior_weight).count()));
   const VectorXd squares = Eigen::SelfAdjointEigenSolver<MatrixXd>(scaled).eigenvalues();
   const double smallest = squares[inertial - out.base_parameters];
   out.condition = smallest > 0.0 ? std::sqrt(squares[inertial - 1] / smallest)
@@ -363,19 +362,17 @@ TorqueErrors torque_errors(const Samples& samples, const Parameters& parameters)
   double differences = 0.0, torques = 0.0;
   for (Index j = 0; j < dof; ++j) {
     const Samples::Joint& joint = samples.joints[static_cast<std::size_t>(j)];
-    const double difference =
-        (joint.b - joint.A.leftCols(10 * dof) * parameters.inertial -
-         joint.A.col(10 * dof) * parameters.damping[j] -
-         joint.A.col(10 * dof + 1) * parameters.friction[j])
-            .squaredNorm();
+    const double difference = (joint.b - joint.A.leftCols(10 * dof) * parameters.inertial -
+                               joint.A.col(10 * dof) * parameters.damping[j] -
+                               joint.A.col(10 * dof + 1) * parameters.friction[j])
+                                  .squaredNorm();
     const double torque = joint.b.squaredNorm();
-    out.joints.push_back({std::sqrt(difference / rows),
-                          torque > 0.0 ? std::sqrt(difference / torque) : 0.0});
+    out.joints.push_back(
+        {std::sqrt(difference / rows), torque > 0.0 ? std::sqrt(difference / torque) : 0.0});
     differences += difference;
     torques += torque;
   }
-  out.all = {std::sqrt(differences / rows),
-             torques > 0.0 ? std::sqrt(differences / torques) : 0.0};
+  out.all = {std::sqrt(differences / rows), torques > 0.0 ? std::sqrt(differences / torques) : 0.0};
   return out;
 }
 

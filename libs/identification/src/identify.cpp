@@ -20,12 +20,14 @@ double time_at_share(const Samples& samples, double share) {
 std::vector<std::string> notes_on(const model::Robot& robot, const Fit& fit) {
   std::vector<std::string> out;
   for (const int j : fit.still_joints)
-    out.push_back(fmt::format("joint '{}' does not move: its damping and friction stay as they were",
-                              robot.links[static_cast<std::size_t>(j)].joint.name));
+    out.push_back(
+        fmt::format("joint '{}' does not move: its damping and friction stay as they were",
+                    robot.links[static_cast<std::size_t>(j)].joint.name));
   for (const int i : fit.repaired_links)
-    out.push_back(fmt::format("link '{}': no body has the inertia of its prior; it was replaced by "
-                              "the nearest one that a body has",
-                              robot.links[static_cast<std::size_t>(i)].name));
+    out.push_back(
+        fmt::format("link '{}': no body has the inertia of its prior; it was replaced by "
+                    "the nearest one that a body has",
+                    robot.links[static_cast<std::size_t>(i)].name));
   return out;
 }
 
@@ -42,8 +44,8 @@ Identification identify(const model::Model& prior, const Record& record, const O
                 rest = between(samples, border_s + samples.window_s, infinity);
   Identification out;
   out.before = parameters_of(prior);
-  out.held_out = torque_errors(
-      rest, fit(prior, first, options.fit, record.where + ": first part").parameters);
+  out.held_out =
+      torque_errors(rest, fit(prior, first, options.fit, record.where + ": first part").parameters);
   out.fit = fit(prior, samples, options.fit, record.where);
   out.robot = with_parameters(prior, out.fit.parameters);
   out.errors_before = torque_errors(samples, out.before);
@@ -56,9 +58,9 @@ Identification identify(const model::Model& prior, const Record& record, const O
   return out;
 }
 
-TorqueErrors test(const model::Model& prior, const Identification& identified, const Record& record,
+TorqueErrors test(const model::Model& model, const Identification& identified, const Record& record,
                   const WindowOptions& options) {
-  return torque_errors(windowed_samples(prior, record, options), identified.fit.parameters);
+  return torque_errors(windowed_samples(model, record, options), identified.fit.parameters);
 }
 
 }  // namespace hamelin::identification

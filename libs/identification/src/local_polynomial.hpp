@@ -5,8 +5,8 @@
 
 namespace hamelin::identification {
 
-/// Positions and rates of a signal by least squares of a cubic over the ticks near a time, which may
-/// be spaced unevenly: Savitzky, Golay (1964).
+/// Positions and rates of a signal by least squares of a cubic over the ticks near a time, which
+/// may be spaced unevenly: Savitzky, Golay (1964).
 class LocalPolynomial {
  public:
   static constexpr int coefficients = 4;

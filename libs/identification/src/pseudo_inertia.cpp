@@ -58,16 +58,15 @@ Matrix4d symmetric_basis(int i) {
 LinkCoordinates::LinkCoordinates(const LinkParameters& prior) : prior_(prior) {
   Matrix4d P = pseudo_inertia(prior);
   const Vector3d center = prior.segment<3>(1) / prior[0];
-  const Matrix3d about_center =
-      P.topLeftCorner<3, 3>() - prior[0] * center * center.transpose();
+  const Matrix3d about_center = P.topLeftCorner<3, 3>() - prior[0] * center * center.transpose();
   const Eigen::SelfAdjointEigenSolver<Matrix3d> moments(about_center);
   const double largest = moments.eigenvalues()[2];
   repaired_ = moments.eigenvalues()[0] <= definite_share * largest;
   if (repaired_) {
     const Vector3d raised = moments.eigenvalues().cwiseMax(repaired_share * largest);
-    P.topLeftCorner<3, 3>() +=
-        moments.eigenvectors() * (raised - moments.eigenvalues()).asDiagonal() *
-        moments.eigenvectors().transpose();
+    P.topLeftCorner<3, 3>() += moments.eigenvectors() *
+                               (raised - moments.eigenvalues()).asDiagonal() *
+                               moments.eigenvectors().transpose();
     prior_ = link_parameters(P);
   }
   const Matrix4d L = P.llt().matrixL();

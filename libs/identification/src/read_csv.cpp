@@ -122,9 +122,9 @@ Record read_csv(const std::filesystem::path& file, const model::Robot& robot, To
   CsvRows rows(read_file(file), file.string());
   std::vector<std::string> fields;
   if (!rows.next(fields))
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: is empty, expected a table of comma-separated values",
-                            file.string()));
+    throw Error(
+        ErrorCode::invalid,
+        fmt::format("{}: is empty, expected a table of comma-separated values", file.string()));
   if (fields.front().starts_with("\xef\xbb\xbf")) fields.front().erase(0, 3);  // byte order mark
   const std::vector<std::string> names = fields;
   const Columns columns(names, robot, rows.where());
@@ -135,7 +135,9 @@ Record read_csv(const std::filesystem::path& file, const model::Robot& robot, To
     if (fields.size() != columns.count)
       throw Error(ErrorCode::parse, fmt::format("{}: {} fields, expected {}", rows.where(),
                                                 fields.size(), columns.count));
-    const auto read = [&](std::size_t at) { return number_of(fields[at], rows.where(), names[at]); };
+    const auto read = [&](std::size_t at) {
+      return number_of(fields[at], rows.where(), names[at]);
+    };
     const double time = read(columns.time);
     if (!std::isfinite(time) || (!record.time_s.empty() && !(time > record.time_s.back())))
       throw Error(ErrorCode::invalid, fmt::format("{}: column 'time_s': {}, expected increasing "

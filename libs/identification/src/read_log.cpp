@@ -60,10 +60,10 @@ void check_joints(const std::filesystem::path& file, const std::vector<std::stri
 
 /// How the torques of a log act, by its header.
 struct LoggedTorque {
-  bool ideal = false;       ///< channels act each in its own way
-  bool every_step = true;   ///< no torque changed between two lines
-  double step_s = 0.0;      ///< of the integrator
-  double hold_s = 0.0;      ///< for which a torque acts at least
+  bool ideal = false;      ///< channels act each in its own way
+  bool every_step = true;  ///< no torque changed between two lines
+  double step_s = 0.0;     ///< of the integrator
+  double hold_s = 0.0;     ///< for which a torque acts at least
 
   explicit LoggedTorque(const Json& header) {
     const Json& config = header["config"];
@@ -90,8 +90,9 @@ class LogRecord {
                               file.string(), payload->value("name", "")));
     if (const Json* const wrenches = find(config, "/wrenches"))
       for (const Json& wrench : *wrenches)
-        wrench_times_.emplace_back(number(wrench, "/from_s", 0.0),
-                                   number(wrench, "/to_s", std::numeric_limits<double>::infinity()));
+        wrench_times_.emplace_back(
+            number(wrench, "/from_s", 0.0),
+            number(wrench, "/to_s", std::numeric_limits<double>::infinity()));
     if (find(config, "/model/friction_speed") != nullptr)
       record_.friction_speed = number(config, "/model/friction_speed", 0.01);
     record_.where = file.string();
@@ -167,8 +168,8 @@ void LogRecord::add_tick(const log::Trajectory::Point& point) {
   contacts_ += contact ? 1 : 0;
   wrenches_ += wrench ? 1 : 0;
   loaded_ += loaded ? 1 : 0;
-  const bool finite = point.q.allFinite() && held.allFinite() && sampled.allFinite() &&
-                      impulse.allFinite();
+  const bool finite =
+      point.q.allFinite() && held.allFinite() && sampled.allFinite() && impulse.allFinite();
   record_.time_s.push_back(point.time_s);
   record_.usable.push_back(has_torque && finite && !contact && !wrench && !loaded ? 1 : 0);
   append(q_, point.q);

@@ -33,8 +33,9 @@ void check_matrix(const Record& record, const MatrixXd& matrix, const char* name
 
 void check(const Record& record, const model::Robot& robot) {
   if (record.usable.size() != record.ticks())
-    throw Error(ErrorCode::invalid, fmt::format("{}: usable: has {} flags, expected {}",
-                                                record.where, record.usable.size(), record.ticks()));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: usable: has {} flags, expected {}", record.where,
+                            record.usable.size(), record.ticks()));
   for (std::size_t k = 0; k < record.ticks(); ++k)
     if (!std::isfinite(record.time_s[k]) || (k > 0 && record.time_s[k] <= record.time_s[k - 1]))
       throw Error(ErrorCode::invalid,

@@ -55,25 +55,26 @@ std::string padded(const std::string& text, std::size_t width) {
 
 std::string links_table(const Identification& identified) {
   std::string text = fmt::format("{:<20} {:>9} {:>9}   {:>24}   {:>24}\n", "link", "mass", "before",
-                                 "center of mass", "before");
+                                 "centre of mass", "before");
   for (std::size_t i = 0; i < identified.robot.links.size(); ++i) {
     const auto at = static_cast<Index>(i);
     const Vector3d now = center_of(identified.fit.parameters, at),
                    before = center_of(identified.before, at);
-    text += fmt::format("{:<20} {:>9.4g} {:>9.4g}   {:>8.4f}{:>8.4f}{:>8.4f}   "
-                        "{:>8.4f}{:>8.4f}{:>8.4f}\n",
-                        identified.robot.links[i].name, identified.fit.parameters.inertial[10 * at],
-                        identified.before.inertial[10 * at], now.x(), now.y(), now.z(), before.x(),
-                        before.y(), before.z());
+    text += fmt::format(
+        "{:<20} {:>9.4g} {:>9.4g}   {:>8.4f}{:>8.4f}{:>8.4f}   "
+        "{:>8.4f}{:>8.4f}{:>8.4f}\n",
+        identified.robot.links[i].name, identified.fit.parameters.inertial[10 * at],
+        identified.before.inertial[10 * at], now.x(), now.y(), now.z(), before.x(), before.y(),
+        before.z());
   }
   return text;
 }
 
 std::string joints_table(const Identification& identified,
                          const std::optional<TorqueErrors>& test) {
-  std::string text = fmt::format("{:<20} {:>19} {:>19} {:>9} {:>8} {:>8} {:>10}{}\n", "joint",
-                                 "damping", "friction", "residual", "%", "% before", "% held out",
-                                 test ? "   % test" : "");
+  std::string text =
+      fmt::format("{:<20} {:>19} {:>19} {:>9} {:>8} {:>8} {:>10}{}\n", "joint", "damping",
+                  "friction", "residual", "%", "% before", "% held out", test ? "   % test" : "");
   const auto row = [&](const std::string& name, const std::string& damping,
                        const std::string& friction, auto&& error_of) {
     const TorqueError now = error_of(identified.errors);
@@ -132,9 +133,10 @@ Json to_json(const Identification& identified, const std::optional<TorqueErrors>
 
 std::string to_table(const Identification& identified, const std::optional<TorqueErrors>& test) {
   std::string text = links_table(identified) + "\n" + joints_table(identified, test);
-  text += "masses in kg, centers of mass in m in the frames of the joints; damping in Nm s/rad or "
-          "N s/m,\nfriction and residual in Nm or N; %: root mean square of the difference over "
-          "that of the torque\n";
+  text +=
+      "masses in kg, centres of mass in m in the frames of the joints; damping in Nm s/rad or "
+      "N s/m,\nfriction and residual in Nm or N; %: root mean square of the difference over "
+      "that of the torque\n";
   text += fmt::format(
       "parameters: {} of the {} combinations that torques depend on are determined by the motion, "
       "condition {:.3g}\nmotion: {} windows of {:.3g} s, noise of the positions {:.2g} at most\n",

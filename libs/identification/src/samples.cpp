@@ -17,9 +17,10 @@ using Eigen::VectorXd;
 
 void check_states(const char* name, const MatrixXd& states, Index rows, Index columns) {
   if (states.rows() != rows || states.cols() != columns || !states.allFinite())
-    throw Error(ErrorCode::usage,
-                fmt::format("exact_samples: {}: {} × {} numbers given, expected {} × {} finite ones",
-                            name, states.rows(), states.cols(), rows, columns));
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("exact_samples: {}: {} × {} numbers given, expected {} × {} finite ones", name,
+                    states.rows(), states.cols(), rows, columns));
 }
 
 }  // namespace

@@ -22,9 +22,9 @@ constexpr double smoothing_min_s = 0.05, window_min_s = 0.1, window_max_s = 0.5;
 constexpr int smoothing_ticks = 8, window_ticks = 12;
 constexpr double strides_per_window = 4.0;
 constexpr Index windows_min = 24, windows_max = 20000;
-constexpr double still_speed = 1e-3;       // [rad/s or m/s]
-constexpr double noise_share_max = 1e-3;   // of the variance of averaged accelerations
-constexpr double square_of_weight = 1.6317;    // ∫φ² dt · T
+constexpr double still_speed = 1e-3;            // [rad/s or m/s]
+constexpr double noise_share_max = 1e-3;        // of the variance of averaged accelerations
+constexpr double square_of_weight = 1.6317;     // ∫φ² dt · T
 constexpr double square_of_curvature = 1120.0;  // ∫φ̈² dt · T⁵
 
 // The weight φ = 35/(16 T) (1 − u²)³, u = 2 (t − t_c)/T, docs/theory.md (2.48).
@@ -84,8 +84,8 @@ double median_period(const Record& record) {
   for (std::size_t k = 1; k < record.ticks(); ++k)
     periods.push_back(record.time_s[k] - record.time_s[k - 1]);
   if (periods.empty())
-    throw Error(ErrorCode::invalid, fmt::format("{}: has {} ticks, expected a motion",
-                                                record.where, record.ticks()));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: has {} ticks, expected a motion", record.where, record.ticks()));
   const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
   std::nth_element(periods.begin(), middle, periods.end());
   return *middle;
@@ -181,13 +181,12 @@ double noise_share(const Pieces& pieces, const Windowing& windowing) {
     count += windows;
   }
   if (count == 0) return 1.0;
-  const double gain =
-      square_of_curvature * pieces.period_s() / std::pow(windowing.length_s, 5);
+  const double gain = square_of_curvature * pieces.period_s() / std::pow(windowing.length_s, 5);
   double worst = 0.0;
   for (Index j = 0; j < noise.size(); ++j)
     if (rates[j] > still_speed * still_speed * static_cast<double>(count))
-      worst = std::max(worst, gain * noise[j] * noise[j] * static_cast<double>(count) /
-                                  accelerations[j]);
+      worst = std::max(worst,
+                       gain * noise[j] * noise[j] * static_cast<double>(count) / accelerations[j]);
   return worst;
 }
 
@@ -210,7 +209,8 @@ Windowing choose_windowing(const Record& record, const Pieces& pieces,
   }
   constexpr double growth = 1.25, share_of_longest = 0.1;
   double length = std::max(window_min_s, least);
-  const double most = std::max(length, std::min(window_max_s, share_of_longest * pieces.longest_s()));
+  const double most =
+      std::max(length, std::min(window_max_s, share_of_longest * pieces.longest_s()));
   while (length * growth <= most &&
          noise_share(pieces, windowing_of(length, pieces)) > noise_share_max)
     length *= growth;
@@ -228,9 +228,8 @@ class Rows {
         P_(model.dof(), 10 * model.dof()),
         L_(P_),
         torque_(model.dof()) {
-    samples_.joints.assign(
-        static_cast<std::size_t>(model.dof()),
-        {MatrixXd::Zero(count, 10 * model.dof() + 2), VectorXd::Zero(count)});
+    samples_.joints.assign(static_cast<std::size_t>(model.dof()),
+                           {MatrixXd::Zero(count, 10 * model.dof() + 2), VectorXd::Zero(count)});
   }
 
   void add(const Piece& piece, const Windowing& windowing) {
@@ -280,8 +279,7 @@ void Rows::add_interval(const Piece& piece, Index k, const Window& window, Index
     joint.A.row(row).head(inertial) -= rise * P_.row(j) + share * L_.row(j);
     joint.A(row, inertial) += share * rate;
     joint.A(row, inertial + 1) += share * std::tanh(piece.v(j, k) / friction_speed_);
-    const double armature =
-        model_.robot().links[static_cast<std::size_t>(j)].joint.armature;
+    const double armature = model_.robot().links[static_cast<std::size_t>(j)].joint.armature;
     joint.b[row] += torque_[j] + armature * rise * rate;
   }
 }
@@ -336,8 +334,7 @@ Samples windowed_samples(const model::Model& model, const Record& record,
   Rows rows(model, record, options.friction_speed, count);
   for (const Piece& piece : pieces.pieces()) rows.add(piece, windowing);
   Samples samples = std::move(rows.samples());
-  samples.overlap =
-      std::max(1.0, windowing.length_s / (square_of_weight * windowing.stride_s));
+  samples.overlap = std::max(1.0, windowing.length_s / (square_of_weight * windowing.stride_s));
   samples.window_s = windowing.length_s;
   samples.q_noise = pieces.noise();
   return samples;

@@ -33,8 +33,10 @@ class SineMotion {
                    high = std::min(joint.upper.value_or(reach), reach);
       middle_[j] = 0.5 * (low + high);
       for (Eigen::Index i = 0; i < terms; ++i) {
-        amplitude_(j, i) = 0.45 * (high - low) * rng.uniform(0.5, 1.0) / (1.0 + static_cast<double>(i)) / 1.9;
-        frequency_(j, i) = 2.0 * std::numbers::pi * (0.1 + 0.17 * static_cast<double>(i) * rng.uniform(0.8, 1.2));
+        amplitude_(j, i) =
+            0.45 * (high - low) * rng.uniform(0.5, 1.0) / (1.0 + static_cast<double>(i)) / 1.9;
+        frequency_(j, i) =
+            2.0 * std::numbers::pi * (0.1 + 0.17 * static_cast<double>(i) * rng.uniform(0.8, 1.2));
         phase_(j, i) = rng.uniform(0.0, 2.0 * std::numbers::pi);
       }
     }
@@ -42,12 +44,10 @@ class SineMotion {
 
   [[nodiscard]] State at(double t) const {
     const Eigen::ArrayXXd angle = frequency_.array() * t + phase_.array();
-    return {middle_ + (amplitude_.array() * angle.sin()).matrix().rowwise().sum(),
-            (amplitude_.array() * frequency_.array() * angle.cos()).matrix().rowwise().sum(),
-            -(amplitude_.array() * frequency_.array().square() * angle.sin())
-                 .matrix()
-                 .rowwise()
-                 .sum()};
+    return {
+        middle_ + (amplitude_.array() * angle.sin()).matrix().rowwise().sum(),
+        (amplitude_.array() * frequency_.array() * angle.cos()).matrix().rowwise().sum(),
+        -(amplitude_.array() * frequency_.array().square() * angle.sin()).matrix().rowwise().sum()};
   }
 
  private:
@@ -72,8 +72,8 @@ inline Eigen::VectorXd motor_torque(const model::Model& model, dynamics::Workspa
 
 struct Recording {
   double duration_s = 10.0, period_s = 1e-3;
-  double q_noise = 0.0;      ///< standard deviation [rad or m]
-  double tau_noise = 0.0;    ///< relative to the torque's root mean square
+  double q_noise = 0.0;    ///< standard deviation [rad or m]
+  double tau_noise = 0.0;  ///< relative to the torque's root mean square
   std::uint64_t seed = 1;
 };
 
@@ -142,7 +142,8 @@ inline model::Robot wrong_prior(model::Robot robot, double share) {
 /// The robot with friction.
 inline model::Robot with_friction(model::Robot robot, double damping, double friction) {
   for (std::size_t i = 0; i < robot.links.size(); ++i) {
-    const double share = 1.0 - 0.8 * static_cast<double>(i) / static_cast<double>(robot.links.size());
+    const double share =
+        1.0 - 0.8 * static_cast<double>(i) / static_cast<double>(robot.links.size());
     robot.links[i].joint.damping = damping * share;
     robot.links[i].joint.friction = friction * share;
   }

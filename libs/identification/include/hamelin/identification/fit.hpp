@@ -32,18 +32,19 @@ struct Fit {
   Eigen::VectorXd sigma;    ///< of the residuals of each joint, standard deviation [Nm or N]
   int base_parameters = 0;  ///< combinations of inertial parameters that torques depend on
   int determined = 0;       ///< of these, that the samples know better than the prior
-  /// Of the base parameters: the largest over the smallest singular value of the regressor, in units
-  /// of the prior's parameters and the torques' root mean squares.
+  /// Of the base parameters: the largest over the smallest singular value of the regressor, in
+  /// units of the prior's parameters and the torques' root mean squares.
   double condition = 0.0;
   std::vector<int> still_joints;    ///< that do not move; their friction is that of the prior
   std::vector<int> repaired_links;  ///< whose prior inertia no body has
 };
 
-/// Least squares with a prior, docs/theory.md (2.54): the masses, centres of mass and inertias of all
-/// links with mass, and damping and dry friction of all joints that move. All links are bodies that
-/// can exist, and directions of the parameters that the samples do not determine stay as in the
-/// model. Weights of the joints come from the residuals. The same input gives the same bytes.
-/// @throws Error invalid if no joint moves or there are too few samples, with `where` in front; usage
+/// Least squares with a prior, docs/theory.md (2.54): the masses, centres of mass and inertias of
+/// all links with mass, and damping and dry friction of all joints that move. All links are bodies
+/// that can exist, and directions of the parameters that the samples do not determine stay as in
+/// the model. Weights of the joints come from the residuals. The same input gives the same bytes.
+/// @throws Error invalid if no joint moves or there are too few samples, with `where` in front;
+/// usage
 ///         for samples of another model or a prior weight that is not positive and finite
 [[nodiscard]] Fit fit(const model::Model& prior, const Samples& samples, const FitOptions& options,
                       const std::string& where);

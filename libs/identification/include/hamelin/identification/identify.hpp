@@ -16,9 +16,9 @@ struct Options {
 };
 
 struct Identification {
-  model::Robot robot;  ///< with what was identified
-  Parameters before;   ///< of the prior
-  Fit fit;             ///< to the whole motion
+  model::Robot robot;                  ///< with what was identified
+  Parameters before;                   ///< of the prior
+  Fit fit;                             ///< to the whole motion
   TorqueErrors errors_before, errors;  ///< of the prior and of the fit, on the whole motion
   TorqueErrors held_out;               ///< of a fit to the first part of the motion, on the rest
   std::size_t samples = 0;
@@ -33,9 +33,10 @@ struct Identification {
 [[nodiscard]] Identification identify(const model::Model& prior, const Record& record,
                                       const Options& options);
 
-/// The error of the identified robot on another motion, whose equations are averaged over the same
-/// windows.
-[[nodiscard]] TorqueErrors test(const model::Model& prior, const Identification& identified,
+/// The error of the identified parameters on another motion of the robot.
+/// @param model the robot in its place and under its gravity there; its parameters do not count
+/// @throws Error as windowed_samples
+[[nodiscard]] TorqueErrors test(const model::Model& model, const Identification& identified,
                                 const Record& record, const WindowOptions& options);
 
 /// As a document, with units in the names of its fields.

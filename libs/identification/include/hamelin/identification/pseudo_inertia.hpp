@@ -3,8 +3,8 @@
 
 namespace hamelin::identification {
 
-/// Ten inertial parameters as in dynamics/regressor.hpp: mass [kg], first moment [kg m], inertia xx,
-/// yy, zz, xy, xz, yz about the origin of the frame [kg m²].
+/// Ten inertial parameters as in dynamics/regressor.hpp: mass [kg], first moment [kg m], inertia
+/// xx, yy, zz, xy, xz, yz about the origin of the frame [kg m²].
 using LinkParameters = Eigen::Matrix<double, 10, 1>;
 
 /// The pseudo-inertia matrix of a link, docs/theory.md (2.51). A body has the parameters exactly if
@@ -16,8 +16,9 @@ using LinkParameters = Eigen::Matrix<double, 10, 1>;
 /// Number i of the symmetric 4 × 4 matrices E_0 … E_9 that are orthonormal for tr(E_i E_j).
 [[nodiscard]] Eigen::Matrix4d symmetric_basis(int i);
 
-/// Coordinates of a link's parameters near those of a prior: P = L (1 + Z) Lᵀ with P₀ = L Lᵀ and
-/// Z = Σ z_i E_i, docs/theory.md (2.52). z = 0 is the prior, and all directions are of one scale.
+/// Coordinates of a link's parameters near those of a prior: Π = G (1 + Z) Gᵀ with Π₀ = G Gᵀ
+/// and Z = Σ z_i E_i, docs/theory.md (2.52). z = 0 is the prior, and all directions are of one
+/// scale.
 class LinkCoordinates {
  public:
   /// A prior that no body has is replaced by the nearest one with the same mass and centre of mass,

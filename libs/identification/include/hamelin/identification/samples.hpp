@@ -10,8 +10,8 @@ namespace hamelin::identification {
 
 /// Linear equations for the parameters of an arm, one row per joint and sample:
 /// A (π, d, c) = b with the inertial parameters π of all links (dynamics/regressor.hpp), and the
-/// damping d and dry friction c of the row's joint. b is the torque of the motor without that of the
-/// rotor's known inertia [Nm or N].
+/// damping d and dry friction c of the row's joint. b is the torque of the motor without that of
+/// the rotor's known inertia [Nm or N].
 struct Samples {
   struct Joint {
     Eigen::MatrixXd A;  ///< samples × (10 dof + 2)
@@ -31,7 +31,8 @@ struct Samples {
 };
 
 /// Samples of known states, docs/theory.md (2.43).
-/// @param q, v, a, tau dof × samples: positions [rad or m], rates, accelerations, and torques of the
+/// @param q, v, a, tau dof × samples: positions [rad or m], rates, accelerations, and torques of
+/// the
 ///        motors [Nm or N]
 /// @param friction_speed of dry friction [rad/s or m/s], above 0
 /// @throws Error usage for sizes that do not fit, numbers that are not finite, or the speed
@@ -42,7 +43,7 @@ struct Samples {
 struct WindowOptions {
   /// Length of the windows over which the equations are averaged [s]. None: from 0.1 s on as long
   /// as the noise of the positions requires.
-  std::optional<double> window_s;
+  std::optional<double> window_s{};
   double friction_speed = 0.01;  ///< of dry friction [rad/s or m/s], above 0
 };
 
