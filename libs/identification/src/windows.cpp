@@ -18,10 +18,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double smoothing_min_s = 0.05, window_min_s = 0.1, window_max_s = 0.5;
+constexpr double smoothing_max_s = 0.1, window_min_s = 0.1, window_max_s = 0.5;
+constexpr double rate_noise_max = 0.25;  // of the speed at which dry friction changes
 constexpr int smoothing_ticks = 8, window_ticks = 12;
 constexpr double strides_per_window = 4.0;
-constexpr Index windows_min = 24, windows_max = 20000;
+constexpr Index windows_min = 32, windows_max = 20000;
 constexpr double still_speed = 1e-3;            // [rad/s or m/s]
 constexpr double noise_share_max = 1e-3;        // of the variance of averaged accelerations
 constexpr double square_of_weight = 1.6317;     // ∫φ² dt · T
@@ -94,22 +95,25 @@ double median_period(const Record& record) {
 /// Makes the pieces of a record, and estimates the noise of its positions.
 class Pieces {
  public:
-  explicit Pieces(const Record& record)
+  Pieces(const Record& record, double friction_speed)
       : record_(record),
         period_s_(median_period(record)),
-        smoothing_s_(std::max(smoothing_min_s, smoothing_ticks * period_s_)),
+        smoothing_s_(smoothing_ticks * period_s_),
         squares_(VectorXd::Zero(record.q.rows())) {
-    std::size_t first = 0;
-    for (std::size_t k = 0; k < record.ticks(); ++k)
-      if (k + 1 == record.ticks() || !joined(k)) {
-        add(first, k + 1);
-        first = k + 1;
-      }
+    cut();
+    noise_ = (squares_ / std::max(1.0, freedom_)).cwiseSqrt();
+    // The rate of a cubic over n ticks in S seconds has the variance 75 σ²/(n S²).
+    const double ratio = noise_.maxCoeff() / (rate_noise_max * friction_speed);
+    const double needed = std::cbrt(75.0 * period_s_ * ratio * ratio);
+    if (const double longer = std::min(needed, smoothing_max_s); longer > smoothing_s_) {
+      smoothing_s_ = longer;
+      cut();
+    }
   }
 
   [[nodiscard]] const std::vector<Piece>& pieces() const noexcept { return pieces_; }
   [[nodiscard]] double period_s() const noexcept { return period_s_; }
-  [[nodiscard]] VectorXd noise() const { return (squares_ / std::max(1.0, freedom_)).cwiseSqrt(); }
+  [[nodiscard]] const VectorXd& noise() const noexcept { return noise_; }
   [[nodiscard]] double longest_s() const {
     double longest = 0.0;
     for (const Piece& piece : pieces_) longest = std::max(longest, piece.length_s());
@@ -122,11 +126,20 @@ class Pieces {
     return record_.usable[k] != 0 && record_.usable[k + 1] != 0 &&
            record_.time_s[k + 1] - record_.time_s[k] <= gap * period_s_;
   }
+  void cut() {
+    pieces_.clear();
+    std::size_t first = 0;
+    for (std::size_t k = 0; k < record_.ticks(); ++k)
+      if (k + 1 == record_.ticks() || !joined(k)) {
+        add(first, k + 1);
+        first = k + 1;
+      }
+  }
   void add(std::size_t first, std::size_t last);
 
   const Record& record_;
   double period_s_, smoothing_s_, freedom_ = 0.0;
-  VectorXd squares_;
+  VectorXd squares_, noise_;
   std::vector<Piece> pieces_;
 };
 
@@ -163,7 +176,7 @@ void Pieces::add(std::size_t first, std::size_t last) {
 
 // The share of noise in the averaged accelerations, of the joint where it is largest.
 double noise_share(const Pieces& pieces, const Windowing& windowing) {
-  const VectorXd noise = pieces.noise();
+  const VectorXd& noise = pieces.noise();
   VectorXd accelerations = VectorXd::Zero(noise.size()), rates = accelerations;
   Index count = 0;
   for (const Piece& piece : pieces.pieces()) {
@@ -318,7 +331,7 @@ Samples windowed_samples(const model::Model& model, const Record& record,
   if (!(options.friction_speed > 0.0) || !std::isfinite(options.friction_speed))
     throw Error(ErrorCode::usage, fmt::format("friction speed: {}, expected a positive number",
                                               options.friction_speed));
-  const Pieces pieces(record);
+  const Pieces pieces(record, options.friction_speed);
   const Windowing windowing = choose_windowing(record, pieces, options.window_s);
   Index count = 0;
   double total = 0.0;

@@ -16,7 +16,10 @@ using Eigen::VectorXd;
 namespace {
 
 model::Robot data_robot(const char* file) {
-  return description::read_robot(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/robots" / file);
+  const std::filesystem::path path =
+      std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/robots" / file;
+  if (path.stem() == "panda") return description::read_robot(path, {"panda_grasptarget", {}});
+  return description::read_robot(path);
 }
 
 Samples samples_of(const model::Model& model, const test::SineMotion& motion, int count) {
@@ -169,12 +172,11 @@ TEST_CASE("joints that stay and links without mass keep what the robot says",
   CHECK(found.still_joints == std::vector<int>{2});
   CHECK(found.parameters.friction[2] == robot.links[2].joint.friction);
   CHECK(std::isnan(found.friction_error[2]));
-  CHECK(found.determined < found.base_parameters);
 
   Samples at_rest = samples;
   for (auto& joint : at_rest.joints) joint.A.rightCols<2>().setZero();
   CHECK(test::error_of([&] { (void)fit(truth, at_rest, {}, "rest.csv"); }) ==
-        "rest.csv: joints 'joint1', 'joint2', 'joint3', 'joint4' do not move, expected a motion");
+        "rest.csv: joints 'j1', 'j2', 'j3', 'j4' do not move, expected a motion");
 
   robot.links[3].mass_kg = 0.0;
   robot.links[3].inertia_kg_m2.setZero();

@@ -29,7 +29,7 @@ Json sampled_config() {
 /// Writes a log with the fields that the reader uses.
 class LogWriter {
  public:
-  explicit LogWriter(const Json& config, long every = 1, const Json& joints = {"joint1", "joint2"})
+  explicit LogWriter(const Json& config, long every = 1, const Json& joints = {"j1", "j2"})
       : log_(folder_.path() / "run.jsonl"), every_(every) {
     Json header{{"program", "run"}, {"scene", "scene.json"},   {"every", every},
                 {"config", config}, {"joints", Json::array()}, {"provenance", Json::object()}};
@@ -164,11 +164,11 @@ TEST_CASE("ticks on which more than motors and gravity acts are left out",
 
 TEST_CASE("logs that cannot be used are refused with one line", "[identification][unit]") {
   CHECK(LogWriter(sampled_config()).error() == "run.jsonl: has no ticks, expected a motion");
-  LogWriter other(sampled_config(), 1, {"joint1", "wrist"});
+  LogWriter other(sampled_config(), 1, {"j1", "wrist"});
   other.ticks(3);
   CHECK(other.error() ==
-        "run.jsonl: line 1: /joints: joint1, wrist, expected those of robot "
-        "'chain2': joint1, joint2");
+        "run.jsonl: line 1: /joints: j1, wrist, expected those of robot "
+        "'chain2': j1, j2");
   LogWriter free(sampled_config());
   free.ticks(3, {{"tau", Json::array()}});
   CHECK(free.error() ==
@@ -195,10 +195,9 @@ TEST_CASE("an exported table is read like its log", "[identification][unit]") {
   CHECK(from_table.time_s == from_log.time_s);
   CHECK(read_csv(file, two_links(), TorqueTiming::sampled).sampled == from_log.held);
 
-  const auto by_hand =
-      folder.put("hand.csv",
-                 "tau_joint2,\"note, quoted\",q_joint1,time_s,q_joint2,tau_joint1\r\n"
-                 "4,\"a \"\"b\"\"\",1,0,2,3\r\n\r\n+4.5,,1.5, 0.5 ,,3.5\r\n");
+  const auto by_hand = folder.put("hand.csv",
+                                  "tau_j2,\"note, quoted\",q_j1,time_s,q_j2,tau_j1\r\n"
+                                  "4,\"a \"\"b\"\"\",1,0,2,3\r\n\r\n+4.5,,1.5, 0.5 ,,3.5\r\n");
   const Record record = read_csv(by_hand, two_links(), TorqueTiming::held);
   CHECK(record.ticks() == 2);
   CHECK(record.held(1, 1) == 4.5);
@@ -208,14 +207,14 @@ TEST_CASE("an exported table is read like its log", "[identification][unit]") {
 }
 
 TEST_CASE("tables that cannot be used are refused with one line", "[identification][unit]") {
-  const std::string head = "time_s,q_joint1,q_joint2,tau_joint1,tau_joint2\n";
+  const std::string head = "time_s,q_j1,q_j2,tau_j1,tau_j2\n";
   CHECK(csv_error("") == "m.csv: is empty, expected a table of comma-separated values");
-  CHECK(csv_error("time_s,q_joint1,q_joint2,tau_joint1\n") ==
-        "m.csv: line 1: has no column 'tau_joint2', expected time_s, and q_ and tau_ of each joint "
-        "of robot 'chain2'; did you mean 'tau_joint1'?");
+  CHECK(csv_error("time_s,q_j1,q_j2,tau_j1\n") ==
+        "m.csv: line 1: has no column 'tau_j2', expected time_s, and q_ and tau_ of each joint "
+        "of robot 'chain2'; did you mean 'tau_j1'?");
   CHECK(csv_error(head + "0,1,2,3,4\n0.1,1,2,3\n") == "m.csv: line 3: 4 fields, expected 5");
   CHECK(csv_error(head + "0,1,2,3,4\n0.1,1,2,3,x4\n") ==
-        "m.csv: line 3: column 'tau_joint2': 'x4', expected a number");
+        "m.csv: line 3: column 'tau_j2': 'x4', expected a number");
   CHECK(csv_error(head + "0.1,1,2,3,4\n0.1,1,2,3,4\n") ==
         "m.csv: line 3: column 'time_s': 0.1, expected increasing times");
   CHECK(csv_error(head + "inf,1,2,3,4\n") ==

@@ -61,7 +61,7 @@ TEST_CASE("the averaged equations hold for the true parameters", "[identificatio
   CHECK(coarse <= 2e-3);
   CHECK(fine <= 0.5 * coarse);
   // any window is exact up to the quadrature, since it acts on both sides
-  for (const double window_s : {0.1, 0.3, 1.0})
+  for (const double window_s : {0.1, 0.3, 0.6})
     CHECK(share_of(model, sampled_record(model, motion, even_ticks(3000, 2e-3)),
                    {.window_s = window_s}) <= 1e-3);
 }
@@ -101,9 +101,10 @@ TEST_CASE("impulses and late samples of torques count where they act", "[identif
   for (std::size_t k = 0; k < late.ticks(); ++k)
     late.sampled.col(static_cast<Eigen::Index>(k)) =
         test::motor_torque(model, ws, motion.at(late.time_s[k] + 1e-3));
-  CHECK(share_of(model, late, {}) <= 1e-3);
+  const double in_time = share_of(model, late, {});
+  CHECK(in_time <= 3e-4);
   late.sampled_shift_s = 0.0;
-  CHECK(share_of(model, late, {}) >= 2e-3);
+  CHECK(share_of(model, late, {}) >= 3.0 * in_time);
 }
 
 TEST_CASE("noisier positions get longer windows", "[identification][unit]") {
@@ -128,7 +129,7 @@ TEST_CASE("records that say too little are refused", "[identification][unit]") {
   const test::SineMotion motion(model, 5);
   const Record record = sampled_record(model, motion, even_ticks(100, 2e-3));
   CHECK(error_in(model, record, {}) ==
-        "motion.csv: its 0.152 s of usable motion give 3 windows of 0.1 s, expected at least 24");
+        "motion.csv: its 0.15 s of usable motion give 3 windows of 0.1 s, expected at least 32");
   CHECK(error_in(model, record, {.window_s = 0.01}) ==
         "motion.csv: window: 0.01 s, expected at least 0.024 s, which are 12 ticks");
   CHECK(error_in(model, record, {.friction_speed = 0.0}) ==
