@@ -85,8 +85,8 @@ double median_period(const Record& record) {
   for (std::size_t k = 1; k < record.ticks(); ++k)
     periods.push_back(record.time_s[k] - record.time_s[k - 1]);
   if (periods.empty())
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: has {} ticks, expected a motion", record.where, record.ticks()));
+    throw Error(ErrorCode::invalid, fmt::format("{}: number of ticks: {}, expected at least 2",
+                                                record.where, record.ticks()));
   const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
   std::nth_element(periods.begin(), middle, periods.end());
   return *middle;

@@ -139,7 +139,7 @@ TEST_CASE("channels of ideal actuation act each in its own way", "[identificatio
 TEST_CASE("ticks on which more than motors and gravity acts are left out",
           "[identification][unit]") {
   Json config = sampled_config();
-  config["wrenches"] = {{{"from_s", 0.095}, {"to_s", 0.102}}};
+  config["wrenches"] = {{{"from_s", 0.0955}, {"to_s", 0.1015}}};
   LogWriter log(config);
   log.ticks(10);
   log.event("attached", "box");
@@ -153,7 +153,7 @@ TEST_CASE("ticks on which more than motors and gravity acts are left out",
   log.ticks(10);
   const Record record = log.read();
   CHECK(record.ticks() == 110);
-  CHECK(usable(record) == 110 - 11 - 5 - 1 - 10);
+  CHECK(usable(record) == 110 - 11 - 5 - 1 - 8);
   CHECK(record.usable[9] == 0);
   CHECK(record.usable[10] == 0);
   CHECK(record.usable[20] == 1);

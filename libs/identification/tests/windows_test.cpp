@@ -129,7 +129,7 @@ TEST_CASE("records that say too little are refused", "[identification][unit]") {
   const test::SineMotion motion(model, 5);
   const Record record = sampled_record(model, motion, even_ticks(100, 2e-3));
   CHECK(error_in(model, record, {}) ==
-        "motion.csv: its 0.15 s of usable motion give 3 windows of 0.1 s, expected at least 32");
+        "motion.csv: its 0.182 s of usable motion give 4 windows of 0.1 s, expected at least 32");
   CHECK(error_in(model, record, {.window_s = 0.01}) ==
         "motion.csv: window: 0.01 s, expected at least 0.024 s, which are 12 ticks");
   CHECK(error_in(model, record, {.friction_speed = 0.0}) ==

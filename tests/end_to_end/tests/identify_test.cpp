@@ -84,7 +84,7 @@ TEST_CASE("robot identify refuses bad input with one line", "[end_to_end]") {
   sandbox.put("short.csv", table + "0,0,0,0,0,0,0\n");
   sandbox.put("rest.csv", at_rest);
   refused({"short.csv"}, "--robot: is missing, expected the robot of short.csv");
-  refused({"short.csv", "--robot", planar}, "short.csv: has 1 ticks, expected a motion");
+  refused({"short.csv", "--robot", planar}, "short.csv: number of ticks: 1, expected at least 2");
   refused({"short.csv", "--robot", "data/robots/arm7.urdf"}, "short.csv: line 1: has no column");
   refused({"rest.csv", "--robot", planar, "-o", "out.json"}, "do not move, expected a motion");
   refused({"rest.csv", "--robot", planar, "-o", "rest.csv"}, "rest.csv");
