@@ -3,8 +3,13 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "command_line.hpp"
 #include "hamelin/control/preparation.hpp"
@@ -13,6 +18,8 @@
 #include "hamelin/identification/identify.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/log/trajectory.hpp"
+#include "hamelin/model/model.hpp"
+#include "hamelin/scene/scene.hpp"
 #include "hamelin/simulation/replay.hpp"
 #include "output.hpp"
 #include "robot_commands.hpp"

@@ -2,6 +2,11 @@
 
 #include <Eigen/Cholesky>
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <vector>
 
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/identification/pseudo_inertia.hpp"

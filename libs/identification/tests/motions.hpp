@@ -2,7 +2,10 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <numbers>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <catch2/catch.hpp>
+#include <cstddef>
+#include <filesystem>
+#include <string>
 
 #include "hamelin/identification/samples.hpp"
 #include "hamelin/log/run_log.hpp"

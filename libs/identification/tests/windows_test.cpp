@@ -1,4 +1,8 @@
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "hamelin/dynamics/regressor.hpp"
 #include "hamelin/identification/samples.hpp"

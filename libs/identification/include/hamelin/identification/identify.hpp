@@ -1,4 +1,6 @@
 #pragma once
+#include <Eigen/Core>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
