@@ -112,7 +112,7 @@ void make_chain(const ChainFlags& flags) {
 }  // namespace
 
 void add_robot(CLI::App& app, int& exit_code) {
-  auto* robot = add_command(app, "robot", "Inspect, check and make robots",
+  auto* robot = add_command(app, "robot", "Inspect, check, identify and make robots",
                             "hamelin robot fit arm.urdf -o arm.spheres.json\n"
                             "hamelin robot check arm.urdf --spheres arm.spheres.json\n"
                             "hamelin robot make-chain --links 7 --axes x,z,x -o chain7.json");
@@ -148,6 +148,7 @@ void add_robot(CLI::App& app, int& exit_code) {
 
   add_robot_fit(*robot, exit_code);
   add_robot_check(*robot, exit_code);
+  add_robot_identify(*robot, exit_code);
 
   auto* chain_command =
       add_command(*robot, "make-chain", "Make a robot file of a chain of equal links along +y",

@@ -10,5 +10,6 @@ inline constexpr const char* strict_help =
 
 void add_robot_fit(CLI::App& robot, int& exit_code);
 void add_robot_check(CLI::App& robot, int& exit_code);
+void add_robot_identify(CLI::App& robot, int& exit_code);
 
 }  // namespace hamelin::app

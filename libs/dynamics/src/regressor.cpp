@@ -101,6 +101,73 @@ void inverse_dynamics_regressor(const Model& model, Workspace& ws, const ConstVe
   }
 }
 
+namespace {
+
+// The rate of a joint's screw, by the velocity that a rate of the joint gives to the point of space
+// where a link's frame is now: docs/theory.md (2.47).
+struct ScrewRate {
+  Vector3d angular = Vector3d::Zero(), linear = Vector3d::Zero();
+};
+
+ScrewRate screw_rate(const Model& model, const Workspace& ws, int joint, const Vector3d& point) {
+  const auto at = static_cast<std::size_t>(joint);
+  const Workspace::Frame& frame = ws.frames[at];
+  const Vector3d turned = ws.motions[at].angular.cross(frame.axis);
+  if (is_prismatic(model, joint)) return {Vector3d::Zero(), turned};
+  return {turned, turned.cross(point - frame.p) - frame.axis.cross(ws.motions[at].linear)};
+}
+
+// Wrenches per parameter, from the axes of a link's frame to those of the world.
+Wrenches in_world(const Workspace::Frame& at, const Flow& flow) {
+  Wrenches out = wrenches_of(flow);
+  out.topRows<3>() = at.R * out.topRows<3>();
+  out.bottomRows<3>() = at.R * out.bottomRows<3>();
+  return out;
+}
+
+}  // namespace
+
+void momentum_regressor(const Model& model, Workspace& ws, const ConstVectorRef& q,
+                        const ConstVectorRef& v, MatrixRef P, MatrixRef L) {
+  constexpr Index per_link = inertial_parameters_per_link;
+  detail::Call("momentum_regressor", model, ws.owner)
+      .joints("q", q)
+      .joints("v", v)
+      .size("P (rows)", P.rows(), ws.owner.dof)
+      .size("P (columns)", P.cols(), per_link * ws.owner.dof)
+      .size("L (rows)", L.rows(), ws.owner.dof)
+      .size("L (columns)", L.cols(), per_link * ws.owner.dof);
+  detail::forward_kinematics(model, ws, q.data());
+  P.setZero();
+  L.setZero();
+  const Vector3d zero = Vector3d::Zero();
+  BodyMotion motion;
+  for (int i = 0; i < model.dof(); ++i) {
+    motion.advance(model, ws, i, v[i], 0.0);
+    const auto link = static_cast<std::size_t>(i);
+    ws.motions[link] = {motion.omega, motion.velocity};
+    const Workspace::Frame& at = ws.frames[link];
+    const auto Rt = at.R.transpose();
+    // a momentum is to the velocity what a wrench is to the acceleration from rest
+    const Wrenches momentum = in_world(at, {zero, Rt * motion.omega, Rt * motion.velocity});
+    const Wrenches weight = in_world(at, {zero, zero, Rt * model.gravity()});
+    for (int j = 0; j <= i; ++j) {
+      auto p = P.row(j).segment<per_link>(per_link * i);
+      auto l = L.row(j).segment<per_link>(per_link * i);
+      const ScrewRate rate = screw_rate(model, ws, j, at.p);
+      const Vector3d column = velocity_column(model, ws, j, at.p);
+      p = column.transpose() * momentum.bottomRows<3>();
+      l = column.transpose() * weight.bottomRows<3>() +
+          rate.linear.transpose() * momentum.bottomRows<3>() +
+          rate.angular.transpose() * momentum.topRows<3>();
+      if (is_prismatic(model, j)) continue;
+      const Vector3d axis = ws.frames[static_cast<std::size_t>(j)].axis;
+      p += axis.transpose() * momentum.topRows<3>();
+      l += axis.transpose() * weight.topRows<3>();
+    }
+  }
+}
+
 model::Robot with_inertial_parameters(const Model& model, const VectorXd& parameters) {
   if (parameters.size() != inertial_parameters_per_link * model.dof())
     throw Error(ErrorCode::usage,

@@ -44,6 +44,32 @@ TEST_CASE("inverse dynamics is the regressor times the parameters", "[dynamics][
   CHECK((inertial_parameters(same) - parameters).norm() <= 1e-12 * parameters.norm());
 }
 
+TEST_CASE("the rate of the momentum is the torque and what no torque makes",
+          "[dynamics][regressor]") {
+  const auto c = GENERATE(test::FrameCase{1, 1, 0, false}, test::FrameCase{2, 7, 0, false},
+                          test::FrameCase{3, 6, 2, false}, test::FrameCase{4, 5, 1, false},
+                          test::FrameCase{5, 4, 0, true}, test::FrameCase{6, 6, 3, true});
+  CAPTURE(c.seed);
+  const Model model = test::model_with_frames(c.seed, c.n, c.prismatic_every, c.planar);
+  Rng rng(c.seed + 71);
+  const VectorXd q = test::random_joints(rng, c.n, 2.0), v = test::random_joints(rng, c.n, 2.0),
+                 a = test::random_joints(rng, c.n, 3.0);
+  Workspace ws(model);
+  MatrixXd P(c.n, 10 * c.n), L(c.n, 10 * c.n), Y(c.n, 10 * c.n), before = P, after = P, other = L;
+  inverse_dynamics_regressor(model, ws, q, v, a, Y);
+  momentum_regressor(model, ws, q, v, P, L);
+  const auto momentum_at = [&](double t, MatrixXd& out) {
+    momentum_regressor(model, ws, q + t * v + 0.5 * t * t * a, v + t * a, out, other);
+  };
+  const double t = 1e-4;
+  momentum_at(-t, before);
+  momentum_at(t, after);
+  CHECK(((after - before) / (2.0 * t) - L - Y).cwiseAbs().maxCoeff() <= 1e-5);
+  VectorXd p(c.n);
+  momentum(model, ws, q, v, p);
+  CHECK((P * inertial_parameters(model) - p).norm() <= 1e-12 * (1.0 + p.norm()));
+}
+
 TEST_CASE("the regressor does not allocate, and refuses what does not fit",
           "[dynamics][regressor]") {
   const Model model = test::model_with_frames(2, 7, 3, false);
@@ -57,4 +83,8 @@ TEST_CASE("the regressor does not allocate, and refuses what does not fit",
   CHECK_THROWS_AS(with_inertial_parameters(model, negative), Error);
   test::require_allocation_count();
   CHECK(test::allocations_in([&] { inverse_dynamics_regressor(model, ws, q, q, q, Y); }) == 0);
+  MatrixXd P = Y, L = Y;
+  CHECK_THROWS_AS(momentum_regressor(model, ws, q, q, wrong, L), Error);
+  CHECK_THROWS_AS(momentum_regressor(model, ws, q, q, P, wrong), Error);
+  CHECK(test::allocations_in([&] { momentum_regressor(model, ws, q, q, P, L); }) == 0);
 }
