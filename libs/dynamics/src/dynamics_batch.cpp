@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <initializer_list>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "derivative_links.hpp"
@@ -39,8 +40,9 @@ BatchPose about_base(const Model& model) {
 
 struct DynamicsBatch::Data {
   Data(const Model& given, const Settings& settings)
-      : model(given),
-        owner(given),
+      : owner(given),
+        chain(given.chain()),
+        has_prismatic_or_rotor(given.has_prismatic_or_rotor()),
         set(&select_dynamics_batch_set(settings.isa)),
         blocks(batch_name, settings.threads, most_rows(static_cast<std::size_t>(given.dof())),
                packet_bytes(given, *set)),
@@ -73,8 +75,15 @@ struct DynamicsBatch::Data {
         });
   }
 
-  Model model;
+  // Calls f(kernels, chain).
+  template <class F>
+  void with_kernels(const F& f) const {
+    kernel::with_group(chain, has_prismatic_or_rotor, *set, f);
+  }
+
   WorkspaceOwner owner;
+  std::variant<model::SpatialChain, model::PlanarChain> chain;
+  bool has_prismatic_or_rotor;
   const DynamicsBatchSet* set;
   StateBlocks blocks;
   std::vector<BatchLink> links;
@@ -108,7 +117,7 @@ void DynamicsBatch::mass_matrix(const ConstStatesRef& q, StatesRef M) {
   DynamicsBatchCall call{};
   call.q = q.data();
   call.by_third = M.data();
-  kernel::with_group(data_->model, *data_->set, [&](const auto& kernels, const auto& chain) {
+  data_->with_kernels([&](const auto& kernels, const auto& chain) {
     data_->run(q, call, [&](const DynamicsBatchCall& part) { kernels.mass_matrix(chain, part); });
   });
 }
@@ -153,7 +162,7 @@ void DynamicsBatch::forward_dynamics_derivatives(const ConstStatesRef& q, const 
   call.by_q = da_dq.data();
   call.by_v = da_dv.data();
   call.by_third = da_dtau.data();
-  kernel::with_group(data_->model, *data_->set, [&](const auto& kernels, const auto& chain) {
+  data_->with_kernels([&](const auto& kernels, const auto& chain) {
     data_->run(q, call, [&](const DynamicsBatchCall& part) {
       kernels.forward_dynamics_derivatives(chain, part);
     });

@@ -89,7 +89,7 @@ void store_forward_derivatives(const DynamicsBatchCall& call, const Packet& pack
                         [&](std::size_t matrix, std::size_t i, std::size_t j, Pack number) {
                           matrices[matrix][i + j * n] = number;
                         });
-  kernel::invert_symmetric(n, packet.by_third);
+  kernel::invert_symmetric(n, packet.by_third, packet.x);
   double* const results[] = {call.by_q, call.by_v};
   kernel::minus_products(n, packet.by_third, packet.by_q, packet.by_v,
                          [&](std::size_t matrix, std::size_t i, std::size_t j, Pack number) {

@@ -127,8 +127,13 @@ geometry::SE3 pose_of(std::string_view function, std::string_view argument, py::
   return {R, p};
 }
 
-py::array_t<double> new_array(std::initializer_list<py::ssize_t> shape) {
-  return py::array_t<double>(py::array::ShapeContainer(shape));
+py::array_t<double> new_array(std::span<const py::ssize_t> shape) {
+  const auto& api = py::detail::npy_api::get();
+  PyObject* const array = api.PyArray_NewFromDescr_(
+      api.PyArray_Type_, api.PyArray_DescrFromType_(npy_double), static_cast<int>(shape.size()),
+      shape.data(), nullptr, nullptr, 0, nullptr);
+  if (array == nullptr) throw py::error_already_set();
+  return py::reinterpret_steal<py::array_t<double>>(array);
 }
 
 py::array_t<double> to_array(const Eigen::VectorXd& x) {

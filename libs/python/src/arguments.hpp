@@ -4,7 +4,9 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -78,8 +80,11 @@ class Numbers {
 [[nodiscard]] geometry::SE3 pose_of(std::string_view function, std::string_view argument,
                                     py::handle given);
 
-/// An array with its own memory.
-[[nodiscard]] py::array_t<double> new_array(std::initializer_list<py::ssize_t> shape);
+/// An array with its own memory, in C order.
+[[nodiscard]] py::array_t<double> new_array(std::span<const py::ssize_t> shape);
+[[nodiscard]] inline py::array_t<double> new_array(std::initializer_list<py::ssize_t> shape) {
+  return new_array(std::span(shape.begin(), shape.size()));
+}
 [[nodiscard]] py::array_t<double> to_array(const Eigen::VectorXd& x);
 [[nodiscard]] py::array_t<double> to_array(const Eigen::Vector3d& x);
 /// In C order.

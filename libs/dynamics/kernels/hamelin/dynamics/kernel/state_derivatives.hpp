@@ -63,23 +63,21 @@ HAMELIN_INLINE void sweep_inwards(const StateDerivativeScratch<S>& k, const Deri
 }
 
 /// Inverts symmetric positive definite matrices in place by symmetric Gauss–Jordan elimination
-/// (sweeps; Goodnight 1979), which reads and writes entries on and below the diagonal only, and
-/// copies them above it at the end.
+/// (sweeps; Goodnight 1979), which needs the entries on and below the diagonal only; at the end they
+/// are copied above it. `pivot` is scratch memory of n numbers.
 template <class S>
-HAMELIN_INLINE void invert_symmetric(std::size_t n, S* A) noexcept {
+HAMELIN_INLINE void invert_symmetric(std::size_t n, S* A, S* pivot) noexcept {
   for (std::size_t k = 0; k < n; ++k) {
     const S inverse = S(1.0) / A[k + k * n];
-    const auto with_pivot = [&](std::size_t i) -> S& {
-      return i > k ? A[i + k * n] : A[k + i * n];
-    };
+    for (std::size_t i = 0; i < k; ++i) pivot[i] = A[k + i * n];
+    for (std::size_t i = k; i < n; ++i) pivot[i] = A[i + k * n];
     for (std::size_t j = 0; j < n; ++j) {
-      if (j == k) continue;
-      const S factor = with_pivot(j) * inverse;
-      for (std::size_t i = j; i < n; ++i)
-        if (i != k) A[i + j * n] -= with_pivot(i) * factor;
+      const S factor = pivot[j] * inverse;
+      S* const column = A + j * n;
+      for (std::size_t i = j; i < n; ++i) column[i] -= pivot[i] * factor;
     }
-    for (std::size_t i = 0; i < n; ++i)
-      if (i != k) with_pivot(i) *= inverse;
+    for (std::size_t i = 0; i < k; ++i) A[k + i * n] = pivot[i] * inverse;
+    for (std::size_t i = k; i < n; ++i) A[i + k * n] = pivot[i] * inverse;
     A[k + k * n] = -inverse;
   }
   for (std::size_t j = 0; j < n; ++j)
