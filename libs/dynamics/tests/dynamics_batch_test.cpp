@@ -77,7 +77,8 @@ struct BatchCalls {
 };
 
 MatrixXd matrix_of(BatchMemory& memory, Index n, Index state) {
-  return memory.block().col(state).reshaped(n, n);
+  const VectorXd entries = memory.block().col(state);
+  return Eigen::Map<const MatrixXd>(entries.data(), n, n);
 }
 
 // The largest difference from a call of one state, of the size of its results.

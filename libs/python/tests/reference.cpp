@@ -82,7 +82,10 @@ void print_matrices(const model::Model& model, const dynamics::StatesXd& q,
   dynamics::StatesXd a(n, states), M(n * n, states), A = M, B = M, C = M;
   dynamics::DynamicsBatch batch(model);
   const auto print_all = [&](const dynamics::StatesXd& matrices) {
-    for (Eigen::Index i = 0; i < states; ++i) print_rows(matrices.col(i).reshaped(n, n));
+    for (Eigen::Index i = 0; i < states; ++i) {
+      const VectorXd entries = matrices.col(i);
+      print_rows(Eigen::Map<const Eigen::MatrixXd>(entries.data(), n, n));
+    }
   };
   batch.mass_matrix(q, M);
   print_all(M);
