@@ -46,7 +46,7 @@ class Numbers {
   [[nodiscard]] py::ssize_t size() const noexcept;
   /// Whether numbers of a column are adjacent; false where both orders are the same.
   [[nodiscard]] bool by_columns() const noexcept { return by_columns_; }
-  [[nodiscard]] const py::array& array() const noexcept { return owner_; }
+  [[nodiscard]] py::array array() const { return py::reinterpret_borrow<py::array>(owner_); }
 
   /// @throws Error usage unless it is a vector of this size
   const Numbers& require_vector(py::ssize_t expected) const;
@@ -60,7 +60,7 @@ class Numbers {
   bool take(py::handle given, Layout layout);
 
   std::string_view function_, argument_;
-  py::array owner_;
+  py::object owner_;  // the array; a py::array without one would make an empty one
   const double* data_ = nullptr;
   py::ssize_t dimensions_ = 0;
   const py::ssize_t* shape_ = nullptr;

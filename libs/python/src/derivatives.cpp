@@ -20,12 +20,12 @@ using Three = std::array<py::array_t<double>, 3>;
 template <class F>
 Three one_by_one(BoundModel& bound, const States& in, const F& f) {
   const py::ssize_t dof = in.dof();
-  Three out;
-  std::array<double*, 3> data{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    out[i] = in.single() ? new_array({dof, dof}) : new_array({in.count(), dof, dof});
-    data[i] = out[i].mutable_data();
-  }
+  const auto made = [&] {
+    return in.single() ? new_array({dof, dof}) : new_array({in.count(), dof, dof});
+  };
+  Three out{made(), made(), made()};
+  const std::array<double*, 3> data{out[0].mutable_data(), out[1].mutable_data(),
+                                    out[2].mutable_data()};
   const auto fill = [&](DerivativesWorkspace& ws) {
     std::array<Eigen::VectorXd, 3> x;
     for (py::ssize_t s = 0; s < in.count(); ++s) {

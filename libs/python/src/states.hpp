@@ -99,16 +99,12 @@ class States {
 class Blocks {
  public:
   Blocks(const States& in, py::ssize_t rows, py::ssize_t columns)
-      : count_(in.count()), rows_(rows), columns_(columns), by_columns_(in.by_columns()) {
-    constexpr py::ssize_t size = sizeof(double);
-    if (by_columns_)
-      array_ = py::array_t<double>(
-          py::array::ShapeContainer{count_, rows, columns},
-          py::array::StridesContainer{size, size * count_, size * count_ * rows});
-    else
-      array_ = new_array({count_, rows, columns});
-    data_ = array_.mutable_data();
-  }
+      : count_(in.count()),
+        rows_(rows),
+        columns_(columns),
+        by_columns_(in.by_columns()),
+        array_(by_columns_ ? array_by_columns() : new_array({count_, rows, columns})),
+        data_(array_.mutable_data()) {}
   [[nodiscard]] const py::array_t<double>& array() const noexcept { return array_; }
   [[nodiscard]] double* data() noexcept { return data_; }
   [[nodiscard]] py::ssize_t entries() const noexcept { return rows_ * columns_; }
@@ -134,6 +130,13 @@ class Blocks {
   }
 
  private:
+  [[nodiscard]] py::array_t<double> array_by_columns() const {
+    constexpr py::ssize_t size = sizeof(double);
+    return py::array_t<double>(
+        py::array::ShapeContainer{count_, rows_, columns_},
+        py::array::StridesContainer{size, size * count_, size * count_ * rows_});
+  }
+
   py::ssize_t count_, rows_, columns_;
   bool by_columns_;
   py::array_t<double> array_;

@@ -63,8 +63,8 @@ HAMELIN_INLINE void sweep_inwards(const StateDerivativeScratch<S>& k, const Deri
 }
 
 /// Inverts symmetric positive definite matrices in place by symmetric Gauss–Jordan elimination
-/// (sweeps; Goodnight 1979), which needs the entries on and below the diagonal only; at the end they
-/// are copied above it. `pivot` is scratch memory of n numbers.
+/// (sweeps; Goodnight 1979), which needs the entries on and below the diagonal only; at the end
+/// they are copied above it. `pivot` is scratch memory of n numbers.
 template <class S>
 HAMELIN_INLINE void invert_symmetric(std::size_t n, S* A, S* pivot) noexcept {
   for (std::size_t k = 0; k < n; ++k) {
