@@ -1,6 +1,7 @@
 #include "derivatives.hpp"
 
 #include <array>
+#include <utility>
 
 #include "frame_arguments.hpp"
 #include "hamelin/dynamics/dynamics_batch.hpp"
@@ -15,6 +16,11 @@ using dynamics::DerivativesWorkspace;
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 using Three = std::array<py::array_t<double>, 3>;
+
+void transpose(double* matrix, py::ssize_t n) {
+  for (py::ssize_t i = 0; i < n; ++i)
+    for (py::ssize_t j = 0; j < i; ++j) std::swap(matrix[i * n + j], matrix[j * n + i]);
+}
 
 // Three n × n matrices at each state, one after the other: f(ws, q, v, x, matrices).
 template <class F>
@@ -33,7 +39,7 @@ Three one_by_one(BoundModel& bound, const States& in, const F& f) {
         return Eigen::Map<Eigen::MatrixXd>(data[i] + s * dof * dof, dof, dof);
       };
       f(ws, in.row(0, s, x[0]), in.row(1, s, x[1]), in.row(2, s, x[2]), matrix);
-      for (std::size_t i = 0; i < 3; ++i) matrix(i).transposeInPlace();  // to C order
+      for (std::size_t i = 0; i < 3; ++i) transpose(data[i] + s * dof * dof, dof);  // to C order
     }
   };
   if (in.count() < states_without_lock) {
