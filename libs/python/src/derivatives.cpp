@@ -17,7 +17,7 @@ using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::R
 
 using Three = std::array<py::array_t<double>, 3>;
 
-void transpose(double* matrix, py::ssize_t n) {
+void transpose_in_place(double* matrix, py::ssize_t n) {
   for (py::ssize_t i = 0; i < n; ++i)
     for (py::ssize_t j = 0; j < i; ++j) std::swap(matrix[i * n + j], matrix[j * n + i]);
 }
@@ -39,7 +39,8 @@ Three one_by_one(BoundModel& bound, const States& in, const F& f) {
         return Eigen::Map<Eigen::MatrixXd>(data[i] + s * dof * dof, dof, dof);
       };
       f(ws, in.row(0, s, x[0]), in.row(1, s, x[1]), in.row(2, s, x[2]), matrix);
-      for (std::size_t i = 0; i < 3; ++i) transpose(data[i] + s * dof * dof, dof);  // to C order
+      for (std::size_t i = 0; i < 3; ++i)
+        transpose_in_place(data[i] + s * dof * dof, dof);  // to C order
     }
   };
   if (in.count() < states_without_lock) {
