@@ -4,7 +4,7 @@
 #include "hamelin/dynamics/kernel/lanes.hpp"
 
 namespace hamelin::dynamics {
-inline namespace HAMELIN_ISA_NAMESPACE {
+namespace HAMELIN_ISA_NAMESPACE {
 
 using BatchPack = kernel::Lanes<kernel::native_lanes>;
 using BatchVec = geometry::Vec3<BatchPack>;

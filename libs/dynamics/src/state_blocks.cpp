@@ -17,7 +17,8 @@ namespace hamelin::dynamics {
 
 namespace {
 
-// Results of a call from this size on go past the caches [bytes].
+// Results of a call from this size on go past the caches [bytes]. Below, writing in place is faster
+// where a core has as much cache; above, it is slower, the more so the more memory is written.
 constexpr std::size_t streamed_bytes = std::size_t{8} << 20;
 constexpr std::size_t line_bytes = 64;
 
@@ -76,7 +77,7 @@ bool overlap(const StatesRef& a, const ConstStatesRef& b) {
 }
 
 std::size_t states_of_block(std::size_t rows) noexcept {
-  for (const std::size_t states : {56, 40, 24})
+  for (const auto states : std::initializer_list<std::size_t>{56, 40, 24})
     if (rows * states * sizeof(double) <= most_block_bytes) return states;
   return 8;
 }

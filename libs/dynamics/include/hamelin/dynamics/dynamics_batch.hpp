@@ -30,13 +30,13 @@ class DynamicsBatch {
   /// @throws Error usage for sizes, strides or memory that do not fit
   void mass_matrix(const ConstStatesRef& q, StatesRef M);
   /// ∂τ/∂q, ∂τ/∂v and ∂τ/∂a = M(q), docs/theory.md (2.24)–(2.28). Row i of a matrix is the torque
-  /// of joint i.
+  /// (or force) of joint i, per rad or m, per rad/s or m/s, and per rad/s² or m/s².
   /// @throws as mass_matrix()
   void inverse_dynamics_derivatives(const ConstStatesRef& q, const ConstStatesRef& v,
                                     const ConstStatesRef& a, StatesRef dtau_dq, StatesRef dtau_dv,
                                     StatesRef dtau_da);
   /// ∂a/∂q, ∂a/∂v and ∂a/∂τ = M(q)⁻¹, docs/theory.md (2.29), and a itself, dof × states. Row i of a
-  /// matrix is the acceleration of joint i.
+  /// matrix is the acceleration of joint i, per rad or m, per rad/s or m/s, and per Nm or N.
   /// @throws as mass_matrix()
   void forward_dynamics_derivatives(const ConstStatesRef& q, const ConstStatesRef& v,
                                     const ConstStatesRef& tau, StatesRef a, StatesRef da_dq,
