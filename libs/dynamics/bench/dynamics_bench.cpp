@@ -3,9 +3,11 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstring>
 
 #include "hamelin/dynamics/derivatives.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/dynamics/dynamics_batch.hpp"
 #include "hamelin/dynamics/frame_batch.hpp"
 
 using namespace hamelin;
@@ -73,20 +75,49 @@ TEST_CASE("time of dynamics over the number of links", "[!benchmark][dynamics]")
   }
 }
 
+namespace {
+
+constexpr int many_joints = 7;
+// Blocks stay in the caches. Their rows should not be a power of two apart, where they would
+// displace each other.
+constexpr Eigen::Index many_states = 100000, states_of_a_block = 136;
+
+dynamics::StatesXd states_of_sines(double step) {
+  dynamics::StatesXd x(many_joints, many_states);
+  for (Eigen::Index s = 0; s < many_states; ++s)
+    for (Eigen::Index i = 0; i < many_joints; ++i)
+      x(i, s) = std::sin(step * static_cast<double>(s * many_joints + i));
+  return x;
+}
+
+// Calls f(first) for all whole blocks.
+template <class F>
+void for_blocks(const F& f) {
+  for (Eigen::Index first = 0; first + states_of_a_block <= many_states; first += states_of_a_block)
+    f(first);
+}
+
+dynamics::StatesXd new_block(Eigen::Index rows) {
+  return dynamics::StatesXd::Zero(rows, states_of_a_block);
+}
+
+}  // namespace
+
+// Divide by 100000 for the time of a state. The results of "at once" have 43 MB; what writing as
+// many bytes takes without computing anything is the bound that memory sets.
 TEST_CASE("time of a pose and a Jacobian at many states", "[!benchmark][dynamics]") {
-  constexpr int n = 7, states = 100000, block = 128;
-  const model::Model model(chain(n, false));
+  const model::Model model(chain(many_joints, false));
   const int tip = model::Model::tip_frame;
   const auto reference = dynamics::Reference::local_world_aligned;
-  dynamics::StatesXd q(n, states), poses(12, states), jacobians(6 * n, states);
-  for (Eigen::Index s = 0; s < states; ++s)
-    for (Eigen::Index i = 0; i < n; ++i) q(i, s) = std::sin(0.1 * static_cast<double>(s * n + i));
+  const dynamics::StatesXd q = states_of_sines(0.1);
+  dynamics::StatesXd poses = dynamics::StatesXd::Zero(12, many_states),
+                     jacobians = dynamics::StatesXd::Zero(6 * many_joints, many_states);
   const Eigen::MatrixXd columns = q;
   BENCHMARK("100000 states, one by one") {
     dynamics::Workspace ws(model);
-    dynamics::Matrix6Xd J(6, n);
+    dynamics::Matrix6Xd J(6, many_joints);
     double sum = 0.0;
-    for (Eigen::Index s = 0; s < states; ++s) {
+    for (Eigen::Index s = 0; s < many_states; ++s) {
       dynamics::forward_kinematics(model, ws, columns.col(s));
       dynamics::frame_jacobian(model, ws, tip, reference, J);
       sum += dynamics::frame_pose(model, ws, tip).p().x() + J(0, 0);
@@ -101,14 +132,141 @@ TEST_CASE("time of a pose and a Jacobian at many states", "[!benchmark][dynamics
     };
   }
   dynamics::FrameBatch batch(model, tip);
-  dynamics::StatesXd some(n, block), block_poses(12, block), block_jacobians(6 * n, block);
-  BENCHMARK("100000 states, in blocks of 128 that stay in the cache") {
+  BENCHMARK("100000 states at once, results in new memory") {
+    dynamics::StatesXd new_poses(12, many_states), new_jacobians(6 * many_joints, many_states);
+    batch.evaluate(q, new_poses, new_jacobians);
+    return new_jacobians(0, 0);
+  };
+  dynamics::StatesXd some = new_block(many_joints), block_poses = new_block(12),
+                     block_jacobians = new_block(6 * many_joints);
+  BENCHMARK("100000 states, in blocks that stay in the cache") {
     double sum = 0.0;
-    for (Eigen::Index s = 0; s + block <= states; s += block) {
-      some = q.middleCols(s, block);
+    for_blocks([&](Eigen::Index first) {
+      some = q.middleCols(first, states_of_a_block);
       batch.evaluate(some, block_poses, block_jacobians);
       sum += block_poses(9, 0) + block_jacobians(0, 0);
+    });
+    return sum;
+  };
+}
+
+TEST_CASE("time of a pose and a Jacobian at many states: the bound of memory",
+          "[!benchmark][dynamics]") {
+  dynamics::StatesXd from = dynamics::StatesXd::Zero(54, many_states), to = from;
+  const std::size_t bytes = static_cast<std::size_t>(to.size()) * sizeof(double);
+  BENCHMARK("memset of as many bytes") {
+    std::memset(to.data(), 1, bytes);
+    return to(0, 0);
+  };
+  BENCHMARK("memcpy of as many bytes") {
+    std::memcpy(to.data(), from.data(), bytes);
+    return to(0, 0);
+  };
+}
+
+namespace {
+
+// Arguments and results of matrices at many states, of blocks of them and of one state.
+struct MatrixCalls {
+  static constexpr Eigen::Index n = many_joints, entries = n * n;
+  struct Results {
+    explicit Results(Eigen::Index states)
+        : a(dynamics::StatesXd::Zero(n, states)),
+          A(dynamics::StatesXd::Zero(entries, states)),
+          B(A),
+          C(A) {}
+    dynamics::StatesXd a, A, B, C;
+  };
+  // f(q, v, x) at one state after the other
+  template <class F>
+  double one_by_one(const F& f) {
+    double sum = 0.0;
+    for (Eigen::Index s = 0; s < many_states; ++s) {
+      f(q_columns.col(s), v_columns.col(s), x_columns.col(s));
+      sum += A(0, 0);
     }
     return sum;
+  }
+  // f(q, v, x, results) in blocks
+  template <class F>
+  double in_blocks(const F& f) {
+    double sum = 0.0;
+    for_blocks([&](Eigen::Index first) {
+      some_q = q.middleCols(first, states_of_a_block);
+      some_v = v.middleCols(first, states_of_a_block);
+      some_x = x.middleCols(first, states_of_a_block);
+      f(some_q, some_v, some_x, some);
+      sum += some.A(0, 0);
+    });
+    return sum;
+  }
+
+  model::Model model{chain(many_joints, false)};
+  dynamics::StatesXd q = states_of_sines(0.1), v = states_of_sines(0.3), x = states_of_sines(0.7),
+                     some_q = new_block(n), some_v = some_q, some_x = some_q;
+  Results all{many_states}, some{states_of_a_block};
+  Eigen::MatrixXd q_columns = q, v_columns = v, x_columns = x, A{n, n}, B{n, n}, C{n, n};
+  VectorXd a{n};
+  dynamics::DerivativesWorkspace ws{model};
+  dynamics::DynamicsBatch batch{model};
+};
+
+}  // namespace
+
+TEST_CASE("time of mass matrices at many states", "[!benchmark][dynamics]") {
+  MatrixCalls calls;
+  BENCHMARK("mass matrix, 100000 states one by one") {
+    return calls.one_by_one([&](const auto& q, const auto&, const auto&) {
+      dynamics::mass_matrix(calls.model, calls.ws.ws, q, calls.A);
+    });
+  };
+  BENCHMARK("mass matrix, at once") {
+    calls.batch.mass_matrix(calls.q, calls.all.A);
+    return calls.all.A(0, 0);
+  };
+  BENCHMARK("mass matrix, in blocks") {
+    return calls.in_blocks([&](const auto& q, const auto&, const auto&, auto& out) {
+      calls.batch.mass_matrix(q, out.A);
+    });
+  };
+}
+
+TEST_CASE("time of derivatives of RNEA at many states", "[!benchmark][dynamics]") {
+  MatrixCalls calls;
+  const auto many = [&](const auto& q, const auto& v, const auto& x, auto& out) {
+    calls.batch.inverse_dynamics_derivatives(q, v, x, out.A, out.B, out.C);
+  };
+  BENCHMARK("derivatives of RNEA, 100000 states one by one") {
+    return calls.one_by_one([&](const auto& q, const auto& v, const auto& x) {
+      dynamics::inverse_dynamics_derivatives(calls.model, calls.ws, q, v, x, calls.A, calls.B,
+                                             calls.C);
+    });
+  };
+  BENCHMARK("derivatives of RNEA, at once") {
+    many(calls.q, calls.v, calls.x, calls.all);
+    return calls.all.A(0, 0);
+  };
+  BENCHMARK("derivatives of RNEA, in blocks") {
+    return calls.in_blocks(many);
+  };
+}
+
+TEST_CASE("time of derivatives of ABA at many states", "[!benchmark][dynamics]") {
+  MatrixCalls calls;
+  const auto many = [&](const auto& q, const auto& v, const auto& x, auto& out) {
+    calls.batch.forward_dynamics_derivatives(q, v, x, out.a, out.A, out.B, out.C);
+  };
+  BENCHMARK("derivatives of ABA, 100000 states one by one") {
+    return calls.one_by_one([&](const auto& q, const auto& v, const auto& x) {
+      dynamics::forward_dynamics_derivatives(calls.model, calls.ws, q, v, x, calls.a, calls.A,
+                                             calls.B, calls.C);
+    });
+  };
+  BENCHMARK("derivatives of ABA, at once") {
+    many(calls.q, calls.v, calls.x, calls.all);
+    return calls.all.A(0, 0);
+  };
+  BENCHMARK("derivatives of ABA, in blocks") {
+    return calls.in_blocks(many);
   };
 }

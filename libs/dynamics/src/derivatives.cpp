@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "derivative_kernels.hpp"
+#include "derivative_links.hpp"
 #include "hamelin/core/isa_kernels.hpp"
 #include "kinematics.hpp"
 
@@ -37,8 +38,8 @@ void place_frames(const Model& model, DerivativesWorkspace& ws, const ConstVecto
   const Vector3d origin = model.base().p();
   for (std::size_t i = 0; i < ws.frames.size(); ++i) {
     const Workspace::Frame& f = ws.ws.frames[i];
-    ws.frames[i] = {vec3(f.R.col(0)), vec3(f.R.col(1)), vec3(f.R.col(2)), vec3(f.p - origin),
-                    vec3(f.axis)};
+    ws.frames[i] = {
+        {vec3(f.R.col(0)), vec3(f.R.col(1)), vec3(f.R.col(2)), vec3(f.p - origin), vec3(f.axis)}};
   }
 }
 
@@ -100,6 +101,14 @@ void compute(const Model& model, DerivativesWorkspace& ws, PotentialDerivatives&
 
 }  // namespace
 
+std::vector<kernel::DerivativeLink> derivative_links(const Model& model) {
+  std::vector<kernel::DerivativeLink> links;
+  for (int i = 0; i < model.dof(); ++i)
+    links.push_back(
+        link_of(model.robot().links[static_cast<std::size_t>(i)], model.com_in_frame(i)));
+  return links;
+}
+
 KineticDerivatives::KineticDerivatives(Index dof)
     : p(VectorXd::Zero(dof)), dK_dq(p), M(Eigen::MatrixXd::Zero(dof, dof)), dp_dq(M), d2K_dq2(M) {}
 
@@ -113,14 +122,12 @@ DerivativesWorkspace::DerivativesWorkspace(const model::Model& model, Isa isa)
       matrices(5 * kernels->leading(static_cast<std::size_t>(model.dof())) *
                static_cast<std::size_t>(model.dof()) * sizeof(double)),
       external(model.dof(), model.dof()),
+      links(derivative_links(model)),
       frames(static_cast<std::size_t>(model.dof())) {
   // what packets read beyond the last joint must be finite
   const auto n = static_cast<std::size_t>(model.dof());
   std::fill_n(static_cast<std::byte*>(sweep.get()), kernels->bytes(n), std::byte{});
   std::fill_n(static_cast<double*>(matrices.get()), 5 * kernels->leading(n) * n, 0.0);
-  for (int i = 0; i < model.dof(); ++i)
-    links.push_back(
-        link_of(model.robot().links[static_cast<std::size_t>(i)], model.com_in_frame(i)));
 }
 
 DerivativesWorkspace::~DerivativesWorkspace() = default;

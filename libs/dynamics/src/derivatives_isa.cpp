@@ -19,7 +19,8 @@ void inverse_dynamics(std::size_t n, void* memory, const kernel::DerivativeLink*
                       const double* v, const double* a, double* dq, double* dv,
                       double* M) noexcept {
   const DerivativeScratch k = DerivativeScratch::at(memory, n);
-  kernel::sweep_outwards(k, links, frames, gravity, v, a);
+  kernel::sweep_outwards(
+      k, links, [&](std::size_t i) -> const auto& { return frames[i]; }, gravity, v, a);
   kernel::sweep_inwards(k, links, dq, dv, M);
 }
 void forward_dynamics(std::size_t n, const double* dq, const double* dv, double* M, double* da_dq,

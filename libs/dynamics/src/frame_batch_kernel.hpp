@@ -1,26 +1,13 @@
 #pragma once
 #include <cstddef>
 
+#include "batch_links.hpp"
 #include "hamelin/core/isa.hpp"
-#include "hamelin/geometry/small.hpp"
 
 namespace hamelin::dynamics {
 
-/// A link's joint-aligned frame in that of its parent, in one form for chains in space and in the
-/// plane: p0 + q slide, then a turn about x by α and about z by sign q + offset (revolute) or by
-/// offset (prismatic).
-struct BatchLink {
-  double cos_alpha, sin_alpha, sign, offset;
-  geometry::Vec3<double> p0, slide;
-  bool prismatic;
-  bool along_x;  ///< the axis of a prismatic joint is x of its frame, else z; a sign does not apply
-};
-
-/// A rotation by its columns, and a position.
-struct BatchPose {
-  geometry::Vec3<double> x, y, z, p;
-};
-
+/// Rows of numbers, one state after the other: `stride` from row to row of q and `result_stride` of
+/// the results.
 struct FrameBatchCall {
   const BatchLink* links;
   std::size_t dof;
@@ -30,7 +17,7 @@ struct FrameBatchCall {
   bool local;          ///< the Jacobians are in the axes of the frame
   bool about_origin;   ///< they are of the body's point at the world's origin, else of the frame's
   void* memory;
-  std::size_t states, stride;
+  std::size_t states, stride, result_stride;
   const double* q;
   double *poses, *jacobians;  ///< null: not wanted
 };

@@ -124,6 +124,7 @@ void inverse_dynamics_derivatives(const Model& model, DerivativesWorkspace& ws,
   constexpr const char* function = "inverse_dynamics_derivatives";
   check_frames(function, model, wrenches);
   inverse_dynamics_derivatives(model, ws, q, v, a, dtau_dq, dtau_dv, dtau_da);  // places the links
+  if (wrenches.empty()) return;
   dtau_dq *= -1.0;
   add_derivatives(function, model, ws.ws, wrenches, dtau_dq);
   dtau_dq *= -1.0;
@@ -134,6 +135,10 @@ void forward_dynamics_derivatives(const Model& model, DerivativesWorkspace& ws,
                                   const ConstVectorRef& tau,
                                   std::span<const ExternalWrench> wrenches, VectorRef a,
                                   MatrixRef da_dq, MatrixRef da_dv, MatrixRef da_dtau) {
+  if (wrenches.empty()) {
+    forward_dynamics_derivatives(model, ws, q, v, tau, a, da_dq, da_dv, da_dtau);
+    return;
+  }
   external_torque_derivative(model, ws.ws, q, wrenches, ws.external);
   external_torque(model, ws.ws, wrenches, ws.ws.column_in);
   detail::Call("forward_dynamics_derivatives", model, ws.ws.owner).joints("tau", tau);

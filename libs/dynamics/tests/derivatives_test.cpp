@@ -30,24 +30,6 @@ Model model_of(const DerivativeCase& c) {
   return Model(std::move(robot), base, Vector3d{1.0, -2.0, -9.0});
 }
 
-// Derivatives of inverse dynamics by complex steps, side by side: by q, v and a.
-MatrixXd complex_steps(const Model& model, const VectorXd& q, const VectorXd& v,
-                       const VectorXd& a) {
-  using Complex = test::ReferenceDynamics<std::complex<double>>;
-  constexpr double step = 1e-30;
-  const Complex reference(model);
-  const Index n = q.size();
-  MatrixXd out(n, 3 * n);
-  Complex::VectorXc x[] = {q.cast<Complex::C>(), v.cast<Complex::C>(), a.cast<Complex::C>()};
-  for (Index k = 0; k < 3 * n; ++k) {
-    auto& entry = x[k / n][k % n];
-    entry += Complex::C(0.0, step);
-    out.col(k) = reference.inverse_dynamics(x[0], x[1], x[2]).imag() / step;
-    entry -= Complex::C(0.0, step);
-  }
-  return out;
-}
-
 }  // namespace
 
 TEST_CASE("derivatives of inverse and forward dynamics agree with complex steps",
@@ -65,7 +47,7 @@ TEST_CASE("derivatives of inverse and forward dynamics agree with complex steps"
                  a = test::random_joints(rng, c.n, 3.0);
   MatrixXd dq(c.n, c.n), dv(c.n, c.n), da(c.n, c.n);
   inverse_dynamics_derivatives(model, ws, q, v, a, dq, dv, da);
-  const MatrixXd expected = complex_steps(model, q, v, a);
+  const MatrixXd expected = test::complex_steps(model, q, v, a);
   // a single joint has no Coriolis torque, only rounding
   const double scale = expected.rightCols(c.n).norm();
   const auto close = [&](const MatrixXd& x, const MatrixXd& y, double tolerance) {

@@ -1,8 +1,10 @@
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "hamelin/dynamics/derivatives.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/dynamics/dynamics_batch.hpp"
 #include "hamelin/dynamics/wrenches.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/test/readme.hpp"
@@ -30,6 +32,10 @@ dynamics::inverse_dynamics(arm, ws, q, v, a, {&push, 1}, loaded);
 dynamics::DerivativesWorkspace derivatives(arm);
 Eigen::MatrixXd by_q(7, 7), by_v(7, 7), by_tau(7, 7);  // row i: the acceleration of joint i
 dynamics::forward_dynamics_derivatives(arm, derivatives, q, v, tau, a, by_q, by_v, by_tau);
+dynamics::DynamicsBatch batch(arm);
+const dynamics::StatesXd states = q.replicate(1, 100);  // one state per column
+dynamics::StatesXd masses(49, 100);  // row i + 7 j: entry (i, j) of the mass matrix at each state
+batch.mass_matrix(states, masses);
   // [example]
   // clang-format on
   Eigen::MatrixXd M(7, 7);
@@ -37,6 +43,8 @@ dynamics::forward_dynamics_derivatives(arm, derivatives, q, v, tau, a, by_q, by_
   dynamics::mass_matrix(arm, ws, q, M);
   dynamics::bias_torque(arm, ws, q, v, bias);
   CHECK((M * a + bias - tau).norm() < 1e-12);
+  for (int i = 0; i < 7; ++i)
+    for (int j = 0; j < 7; ++j) CHECK(std::abs(masses(i + 7 * j, 42) - M(i, j)) < 1e-14);
   CHECK((M * by_tau - Eigen::MatrixXd::Identity(7, 7)).norm() < 1e-10);
   CHECK(bias.norm() > 1.0);
   const double e = 1e-6;

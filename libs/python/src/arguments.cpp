@@ -65,7 +65,7 @@ bool Numbers::take(py::handle given, Layout layout) {
   const bool columns = (array->flags & py::detail::npy_api::NPY_ARRAY_F_CONTIGUOUS_) != 0;
   if ((array->flags & py::detail::npy_api::NPY_ARRAY_ALIGNED_) == 0) return false;
   if (!rows && (layout != Layout::rows_or_columns || !columns)) return false;
-  owner_ = py::reinterpret_borrow<py::array>(given);
+  owner_ = py::reinterpret_borrow<py::object>(given);
   data_ = reinterpret_cast<const double*>(array->data);
   dimensions_ = array->nd;
   shape_ = array->dimensions;
@@ -82,14 +82,14 @@ py::ssize_t Numbers::size() const noexcept {
 const Numbers& Numbers::require_vector(py::ssize_t expected) const {
   if (dimensions_ != 1 || shape_[0] != expected)
     refuse(function_, argument_,
-           fmt::format("shape {}, expected ({},)", describe_shape(owner_), expected));
+           fmt::format("shape {}, expected ({},)", describe_shape(array()), expected));
   return *this;
 }
 
 const Numbers& Numbers::require_rows(py::ssize_t columns) const {
   if (dimensions_ != 2 || shape_[1] != columns)
     refuse(function_, argument_,
-           fmt::format("shape {}, expected (N, {})", describe_shape(owner_), columns));
+           fmt::format("shape {}, expected (N, {})", describe_shape(array()), columns));
   return *this;
 }
 
@@ -127,8 +127,13 @@ geometry::SE3 pose_of(std::string_view function, std::string_view argument, py::
   return {R, p};
 }
 
-py::array_t<double> new_array(std::initializer_list<py::ssize_t> shape) {
-  return py::array_t<double>(py::array::ShapeContainer(shape));
+py::array_t<double> new_array(std::span<const py::ssize_t> shape) {
+  const auto& api = py::detail::npy_api::get();
+  PyObject* const array = api.PyArray_NewFromDescr_(
+      api.PyArray_Type_, api.PyArray_DescrFromType_(npy_double), static_cast<int>(shape.size()),
+      shape.data(), nullptr, nullptr, 0, nullptr);
+  if (array == nullptr) throw py::error_already_set();
+  return py::reinterpret_steal<py::array_t<double>>(array);
 }
 
 py::array_t<double> to_array(const Eigen::VectorXd& x) {

@@ -4,7 +4,9 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,7 +46,7 @@ class Numbers {
   [[nodiscard]] py::ssize_t size() const noexcept;
   /// Whether numbers of a column are adjacent; false where both orders are the same.
   [[nodiscard]] bool by_columns() const noexcept { return by_columns_; }
-  [[nodiscard]] const py::array& array() const noexcept { return owner_; }
+  [[nodiscard]] py::array array() const { return py::reinterpret_borrow<py::array>(owner_); }
 
   /// @throws Error usage unless it is a vector of this size
   const Numbers& require_vector(py::ssize_t expected) const;
@@ -58,7 +60,7 @@ class Numbers {
   bool take(py::handle given, Layout layout);
 
   std::string_view function_, argument_;
-  py::array owner_;
+  py::object owner_;  // the array; a py::array without one would make an empty one
   const double* data_ = nullptr;
   py::ssize_t dimensions_ = 0;
   const py::ssize_t* shape_ = nullptr;
@@ -78,8 +80,11 @@ class Numbers {
 [[nodiscard]] geometry::SE3 pose_of(std::string_view function, std::string_view argument,
                                     py::handle given);
 
-/// An array with its own memory.
-[[nodiscard]] py::array_t<double> new_array(std::initializer_list<py::ssize_t> shape);
+/// An array with its own memory, in C order.
+[[nodiscard]] py::array_t<double> new_array(std::span<const py::ssize_t> shape);
+[[nodiscard]] inline py::array_t<double> new_array(std::initializer_list<py::ssize_t> shape) {
+  return new_array(std::span(shape.begin(), shape.size()));
+}
 [[nodiscard]] py::array_t<double> to_array(const Eigen::VectorXd& x);
 [[nodiscard]] py::array_t<double> to_array(const Eigen::Vector3d& x);
 /// In C order.

@@ -75,54 +75,6 @@ py::array_t<double> tip_pose(BoundModel& bound, py::handle q) {
   });
 }
 
-// An array with a block of rows × columns per state, in Fortran order if the states are, else in C
-// order, and how to write to it.
-class Blocks {
- public:
-  Blocks(const States& in, py::ssize_t rows, py::ssize_t columns)
-      : count_(in.count()), rows_(rows), columns_(columns), by_columns_(in.by_columns()) {
-    constexpr py::ssize_t size = sizeof(double);
-    if (by_columns_)
-      array_ = py::array_t<double>(
-          py::array::ShapeContainer{count_, rows, columns},
-          py::array::StridesContainer{size, size * count_, size * count_ * rows});
-    else
-      array_ = new_array({count_, rows, columns});
-    data_ = array_.mutable_data();
-  }
-  [[nodiscard]] const py::array_t<double>& array() const noexcept { return array_; }
-  // Entry (row, column) of `states` states from `first` on.
-  void write(py::ssize_t first, py::ssize_t states, py::ssize_t row, py::ssize_t column,
-             const double* numbers) {
-    if (by_columns_) {
-      std::copy_n(numbers, states, data_ + first + count_ * (row + rows_ * column));
-      return;
-    }
-    double* const to = data_ + first * rows_ * columns_ + row * columns_ + column;
-    for (py::ssize_t i = 0; i < states; ++i) to[i * rows_ * columns_] = numbers[i];
-  }
-
- private:
-  py::ssize_t count_, rows_, columns_;
-  bool by_columns_;
-  py::array_t<double> array_;
-  double* data_;
-};
-
-// Many states in SIMD lanes, block by block: evaluate(q, out) fills out, `rows` × states, and
-// write(first, states, out) takes its numbers, which are block_states apart from row to row.
-template <class Evaluate, class Write>
-void in_blocks(const States& in, py::ssize_t rows, const Evaluate& evaluate, const Write& write) {
-  const Unlocked unlocked(in.count());
-  dynamics::StatesXd q(in.dof(), block_states), out(rows, block_states);
-  for (py::ssize_t first = 0; first < in.count(); first += block_states) {
-    const py::ssize_t states = std::min(block_states, in.count() - first);
-    in.gather(0, first, states, q);
-    evaluate(q.leftCols(states), out.leftCols(states));
-    write(first, states, out.data());
-  }
-}
-
 py::array_t<double> frame_pose(BoundModel& bound, py::handle q, py::handle frame) {
   const py::ssize_t dof = bound.model.dof();
   const int index = frame_index("frame_pose", bound.model, frame);
@@ -137,15 +89,18 @@ py::array_t<double> frame_pose(BoundModel& bound, py::handle q, py::handle frame
   const std::array<double, block_states> zeros{};
   std::array<double, block_states> ones;
   ones.fill(1.0);
-  in_blocks(
-      in, 12, [&](const auto& at, auto&& poses) { batch.poses(at, poses); },
-      [&](py::ssize_t first, py::ssize_t states, const double* numbers) {
-        for (py::ssize_t column = 0; column < 4; ++column) {
-          for (py::ssize_t row = 0; row < 3; ++row)
-            out.write(first, states, row, column, numbers + (3 * column + row) * block_states);
-          out.write(first, states, 3, column, (column < 3 ? zeros : ones).data());
-        }
-      });
+  const Unlocked unlocked(in.count());
+  dynamics::StatesXd at(dof, block_states), poses(12, block_states);
+  for (py::ssize_t first = 0; first < in.count(); first += block_states) {
+    const py::ssize_t states = std::min(block_states, in.count() - first);
+    in.gather(0, first, states, at);
+    batch.poses(at.leftCols(states), poses.leftCols(states));
+    for (py::ssize_t column = 0; column < 4; ++column) {
+      for (py::ssize_t row = 0; row < 3; ++row)
+        out.write(first, states, row, column, poses.row(3 * column + row).data());
+      out.write(first, states, 3, column, (column < 3 ? zeros : ones).data());
+    }
+  }
   return out.array();
 }
 
@@ -173,24 +128,19 @@ py::array_t<double> frame_jacobian(BoundModel& bound, py::handle q, py::handle f
                               dynamics::frame_jacobian(bound.model, ws, index, terms, J);
                               Eigen::Map<RowMatrix>(y, 6, dof) = J;
                             });
-  Blocks out(in, 6, dof);
+  std::array<Blocks, 1> out{Blocks(in, 6, dof)};
   dynamics::FrameBatch batch(bound.model, index, {.reference = terms});
-  in_blocks(
-      in, 6 * dof, [&](const auto& at, auto&& J) { batch.jacobians(at, J); },
-      [&](py::ssize_t first, py::ssize_t states, const double* numbers) {
-        for (py::ssize_t column = 0; column < dof; ++column)
-          for (py::ssize_t row = 0; row < 6; ++row)
-            out.write(first, states, row, column, numbers + (6 * column + row) * block_states);
-      });
-  return out.array();
+  evaluate_in_blocks(in, out, [&](const auto& given, const auto& results) {
+    batch.jacobians(given(0), results(0));
+  });
+  return out[0].array();
 }
 
 // A twist or its rate at each state: f(ws, rows of the arguments).
 template <class F>
 py::array_t<double> twists(BoundModel& bound, const States& in, const F& f) {
   std::array<Eigen::VectorXd, 3> x;
-  for (auto& each : x) each.resize(in.dof());
-  return for_each_state(bound, in, {6}, [&, x](auto& ws, py::ssize_t i, double* y) mutable {
+  return for_each_state(bound, in, {6}, [&](auto& ws, py::ssize_t i, double* y) {
     dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x[0]));
     Eigen::Map<dynamics::Vector6d> out(y);
     out = f(ws, [&](std::size_t argument) { return in.row(argument, i, x[argument]); });

@@ -12,6 +12,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/dynamics/centroidal.hpp"
+#include "hamelin/dynamics/dynamics_batch.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/scene/shapes.hpp"
 #include "kinematics.hpp"
@@ -129,7 +130,7 @@ py::array_t<double> joint_vector(BoundModel& bound, const char* name, py::handle
   States in(name, dof);
   in.add("q", q);
   return for_each_state(
-      bound, in, {dof}, [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
+      bound, in, {dof}, [&, x = Eigen::VectorXd()](auto& ws, py::ssize_t i, double* y) mutable {
         function(bound.model, ws, in.row(0, i, x), Eigen::Map<Eigen::VectorXd>(y, dof));
       });
 }
@@ -142,8 +143,8 @@ py::array_t<double> joint_vector(BoundModel& bound, const char* name, py::handle
   in.add("q", q);
   in.add(second, v);
   return for_each_state(bound, in, {dof},
-                        [&, x = Eigen::VectorXd(dof), y = Eigen::VectorXd(dof)](
-                            auto& ws, py::ssize_t i, double* out) mutable {
+                        [&, x = Eigen::VectorXd(), y = Eigen::VectorXd()](auto& ws, py::ssize_t i,
+                                                                          double* out) mutable {
                           function(bound.model, ws, in.row(0, i, x), in.row(1, i, y),
                                    Eigen::Map<Eigen::VectorXd>(out, dof));
                         });
@@ -153,12 +154,19 @@ py::array_t<double> crba(BoundModel& bound, py::handle q) {
   const py::ssize_t dof = bound.model.dof();
   States in("crba", dof);
   in.add("q", q);
-  return for_each_state(bound, in, {dof, dof},
-                        [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
-                          // Symmetric, so that rows and columns are the same.
-                          dynamics::mass_matrix(bound.model, ws, in.row(0, i, x),
-                                                Eigen::Map<Eigen::MatrixXd>(y, dof, dof));
-                        });
+  if (in.single()) {
+    auto out = new_array({dof, dof});
+    // symmetric, so that rows and columns are the same
+    dynamics::mass_matrix(bound.model, bound.ws, in[0].vector(),
+                          Eigen::Map<Eigen::MatrixXd>(out.mutable_data(), dof, dof));
+    return out;
+  }
+  std::array<Blocks, 1> out{Blocks(in, dof, dof)};
+  dynamics::DynamicsBatch batch(bound.model);
+  evaluate_in_blocks(in, out, [&](const auto& given, const auto& results) {
+    batch.mass_matrix(given(0), results(0));
+  });
+  return out[0].array();
 }
 
 // Energies of one state are numbers, of many states arrays.
@@ -174,7 +182,7 @@ py::object kinetic_energy(BoundModel& bound, py::handle q, py::handle v) {
   States in("kinetic_energy", bound.model.dof());
   in.add("q", q);
   in.add("v", v);
-  Eigen::VectorXd x(bound.model.dof()), y(bound.model.dof());
+  Eigen::VectorXd x, y;
   return energies(bound, in, [&](auto& ws, py::ssize_t i) {
     return dynamics::kinetic_energy(bound.model, ws, in.row(0, i, x), in.row(1, i, y));
   });
@@ -183,7 +191,7 @@ py::object kinetic_energy(BoundModel& bound, py::handle q, py::handle v) {
 py::object potential_energy(BoundModel& bound, py::handle q) {
   States in("potential_energy", bound.model.dof());
   in.add("q", q);
-  Eigen::VectorXd x(bound.model.dof());
+  Eigen::VectorXd x;
   return energies(bound, in, [&](auto& ws, py::ssize_t i) {
     return dynamics::potential_energy(bound.model, ws, in.row(0, i, x));
   });
@@ -191,14 +199,14 @@ py::object potential_energy(BoundModel& bound, py::handle q) {
 
 py::array_t<double> per_joint(const BoundModel& bound, std::optional<double> model::Joint::*member,
                               double none) {
-  Eigen::VectorXd x(bound.model.dof());
+  Eigen::VectorXd x;
   for (int i = 0; i < bound.model.dof(); ++i)
     x[i] = (bound.model.robot().links[static_cast<std::size_t>(i)].joint.*member).value_or(none);
   return to_array(x);
 }
 
 py::array_t<double> per_joint(const BoundModel& bound, double model::Joint::*member) {
-  Eigen::VectorXd x(bound.model.dof());
+  Eigen::VectorXd x;
   for (int i = 0; i < bound.model.dof(); ++i)
     x[i] = bound.model.robot().links[static_cast<std::size_t>(i)].joint.*member;
   return to_array(x);
@@ -364,7 +372,8 @@ void add_dynamics(py::class_<BoundModel, SharedModel>& type) {
            "q, v, tau: shape (n,), or (N, n) for N states in SIMD lanes, as in rnea. Returns the\n"
            "same shape.")
       .def("crba", &crba, arg("q"),
-           "Mass matrix M(q), shape (n, n); or (N, n, n) for q of shape (N, n).")
+           "Mass matrix M(q), shape (n, n); or (N, n, n) for q of shape (N, n), of states in SIMD\n"
+           "lanes, in Fortran order if q is.")
       .def(
           "gravity_torque",
           [](BoundModel& m, py::handle q) {

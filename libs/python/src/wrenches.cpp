@@ -25,7 +25,7 @@ py::array_t<double> external_torque(BoundModel& bound, py::handle q, py::handle 
   States in("external_torque", dof);
   in.add("q", q);
   return for_each_state(bound, in, {dof},
-                        [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
+                        [&, x = Eigen::VectorXd()](auto& ws, py::ssize_t i, double* y) mutable {
                           dynamics::external_torque(bound.model, ws, in.row(0, i, x), given,
                                                     Eigen::Map<Eigen::VectorXd>(y, dof));
                         });
@@ -37,10 +37,11 @@ std::vector<dynamics::ExternalWrench> wrenches_of(const char* function, py::hand
   std::vector<dynamics::ExternalWrench> out;
   if (given.is_none()) return out;
   for (const auto& item : py::reinterpret_borrow<py::object>(given)) {
-    if (!py::isinstance<PyWrench>(item))
+    py::detail::make_caster<PyWrench> wrench;
+    if (item.is_none() || !wrench.load(item, false))
       throw py::type_error(
           fmt::format("{}: wrenches: expected wrenches, as Model.wrench() makes them", function));
-    out.push_back(item.cast<const PyWrench&>());
+    out.push_back(py::detail::cast_op<const PyWrench&>(wrench));
   }
   return out;
 }

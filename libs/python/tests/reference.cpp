@@ -9,6 +9,7 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/dynamics/dynamics_batch.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/scene/scene.hpp"
@@ -74,6 +75,26 @@ void print_distances(const scene::Environment& environment, const scene::SelfFie
   print(&out[0], 3);
 }
 
+// Matrices of all states, in lanes; each in C order.
+void print_matrices(const model::Model& model, const dynamics::StatesXd& q,
+                    const dynamics::StatesXd& v, const dynamics::StatesXd& x) {
+  const Eigen::Index n = model.dof(), states = q.cols();
+  dynamics::StatesXd a(n, states), M(n * n, states), A = M, B = M, C = M;
+  dynamics::DynamicsBatch batch(model);
+  const auto print_all = [&](const dynamics::StatesXd& matrices) {
+    for (Eigen::Index i = 0; i < states; ++i) {
+      const VectorXd entries = matrices.col(i);
+      print_rows(Eigen::Map<const Eigen::MatrixXd>(entries.data(), n, n));
+    }
+  };
+  batch.mass_matrix(q, M);
+  print_all(M);
+  batch.inverse_dynamics_derivatives(q, v, x, A, B, C);
+  for (const auto* matrices : {&A, &B, &C}) print_all(*matrices);
+  batch.forward_dynamics_derivatives(q, v, x, a, A, B, C);
+  for (const auto* matrices : {&A, &B, &C}) print_all(*matrices);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -104,5 +125,6 @@ int main(int argc, char** argv) {
   print_rows(y.transpose());
   dynamics::forward_dynamics(model, batch, q, v, x, y);
   print_rows(y.transpose());
+  print_matrices(model, q, v, x);
   return 0;
 }

@@ -85,13 +85,15 @@ def test_same_bits_as_the_libraries(arm, scenes, states, reference):
     q, v, x = (np.ascontiguousarray(states[:, i]) for i in range(3))
     same(arm.rnea(q, v, x), reader.next(STATES, 7))
     same(arm.aba(q, v, x), reader.next(STATES, 7))
+    same(arm.crba(q), reader.next(STATES, 7, 7))
+    for matrices in (*arm.rnea_derivatives(q, v, x), *arm.aba_derivatives(q, v, x)):
+        same(matrices, reader.next(STATES, 7, 7))
     assert reader.at == reference.size
     # Arrays of states give the same bits as one state after the other.
     same(arm.gravity_torque(q), np.array([s[2] for s in singles]))
     same(arm.bias_torque(q, v), np.array([s[3] for s in singles]))
     same(arm.momentum(q, v), np.array([s[4] for s in singles]))
     same(arm.solve_mass(q, v), np.array([s[5] for s in singles]))
-    same(arm.crba(q), np.array([s[6] for s in singles]))
     same(arm.kinetic_energy(q, v), np.array([s[7][0] for s in singles]))
     same(arm.potential_energy(q), np.array([s[7][1] for s in singles]))
     same(arm.forward_kinematics(q), np.array([s[8] for s in singles]))
@@ -101,7 +103,7 @@ def test_same_bits_as_the_libraries(arm, scenes, states, reference):
     same(environment.self_clearance(q), np.array([d[1] for d in distances]))
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 127, 128, 129, 300])
+@pytest.mark.parametrize("count", [0, 1, 2, 135, 136, 137, 300])
 def test_layouts_give_the_same_bits(arm, count):
     q, v, x = np.random.default_rng(count).normal(size=(3, count, 7))
     rows = arm.aba(q, v, x)
@@ -116,6 +118,43 @@ def test_layouts_give_the_same_bits(arm, count):
         assert columns.flags.f_contiguous
     if count:
         same(arm.aba(q.astype(np.float32).astype(float), v, x)[0].shape, (7,))
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 7, 15, 16, 135, 136, 137, 300])
+def test_matrices_of_many_states_are_those_of_one(arm, count):
+    q, v, x = np.random.default_rng(count).normal(size=(3, count, 7))
+    few = range(min(count, 40))
+    for function, arguments in [
+        (lambda q: (arm.crba(q),), (q,)),
+        (arm.rnea_derivatives, (q, v, x)),
+        (arm.aba_derivatives, (q, v, x)),
+    ]:
+        many = function(*arguments)
+        columns = function(*(np.asfortranarray(y) for y in arguments))
+        mixed = function(np.asfortranarray(q), *arguments[1:])
+        for k, matrices in enumerate(many):
+            assert matrices.shape == (count, 7, 7)
+            assert matrices.flags.c_contiguous
+            same(columns[k], matrices)
+            same(mixed[k], matrices)
+            if count > 1:
+                assert columns[k].flags.f_contiguous
+        for s in few:
+            single = function(*(y[s] for y in arguments))
+            for matrices, expected in zip(many, single):
+                scale = np.abs(expected).max()
+                np.testing.assert_allclose(matrices[s], expected, rtol=0, atol=1e-12 * scale)
+
+
+def test_a_state_that_is_not_finite_affects_no_other(arm):
+    q, v, x = np.random.default_rng(4).normal(size=(3, 40, 7))
+    clean = (arm.crba(q), *arm.rnea_derivatives(q, v, x), *arm.aba_derivatives(q, v, x))
+    q[13, 2], v[13, 0], x[13, 1] = np.nan, np.inf, -np.inf
+    others = np.arange(40) != 13
+    found = (arm.crba(q), *arm.rnea_derivatives(q, v, x), *arm.aba_derivatives(q, v, x))
+    for matrices, expected in zip(found, clean):
+        same(matrices[others], expected[others])
+        assert not np.isfinite(matrices[13]).all()
 
 
 def test_dynamics_against_independent_formulas(arm):

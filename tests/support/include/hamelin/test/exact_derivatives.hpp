@@ -160,4 +160,22 @@ class ReferenceDynamics {
   const model::Model& model_;
 };
 
+/// Derivatives of inverse dynamics by complex steps, side by side: by q, v and a.
+inline Eigen::MatrixXd complex_steps(const model::Model& model, const Eigen::VectorXd& q,
+                                     const Eigen::VectorXd& v, const Eigen::VectorXd& a) {
+  using Complex = ReferenceDynamics<std::complex<double>>;
+  constexpr double step = 1e-30;
+  const Complex reference(model);
+  const Eigen::Index n = q.size();
+  Eigen::MatrixXd out(n, 3 * n);
+  Complex::VectorXc x[] = {q.cast<Complex::C>(), v.cast<Complex::C>(), a.cast<Complex::C>()};
+  for (Eigen::Index k = 0; k < 3 * n; ++k) {
+    auto& entry = x[k / n][k % n];
+    entry += Complex::C(0.0, step);
+    out.col(k) = reference.inverse_dynamics(x[0], x[1], x[2]).imag() / step;
+    entry -= Complex::C(0.0, step);
+  }
+  return out;
+}
+
 }  // namespace hamelin::test

@@ -1,12 +1,15 @@
 #pragma once
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 
 #include "hamelin/dynamics/kernel/lanes.hpp"
 #include "hamelin/geometry/small.hpp"
 
 /// Derivatives of inverse and forward dynamics, docs/theory.md (2.24)–(2.29), for chains in either
-/// group: everything is expressed in the axes of the world about one point.
+/// group: everything is expressed in the axes of the world about one point. S is the scalar, double
+/// or Lanes. The derivatives at one state have a row of joints in the lanes of registers; those at
+/// many states are in kernel/state_derivatives.hpp.
 namespace hamelin::dynamics::kernel {
 
 /// Constants of a link: mass, Σ m r and Σ m r rᵀ of its particles in the axes of its frame, about
@@ -20,9 +23,11 @@ struct DerivativeLink {
 
 /// A link's frame in the world: columns of its rotation, its origin from the reference point, and
 /// the joint's axis.
-struct DerivativeFrame {
-  geometry::Vec3<double> x, y, z, p, axis;
+template <class S>
+struct PlacedFrame {
+  geometry::Vec3<S> x, y, z, p, axis;
 };
+struct DerivativeFrame : PlacedFrame<double> {};
 
 inline namespace HAMELIN_ISA_NAMESPACE {
 
@@ -31,81 +36,97 @@ using geometry::Sym3;
 using geometry::Vec3;
 
 /// A twist (angular, linear), or a wrench (moment, force).
+template <class S>
 struct Screw {
-  Vec3<double> a, b;
+  Vec3<S> a, b;
 };
-HAMELIN_INLINE Screw operator+(const Screw& m, const Screw& n) noexcept {
+template <class S>
+HAMELIN_INLINE Screw<S> operator+(const Screw<S>& m, const Screw<S>& n) noexcept {
   return {m.a + n.a, m.b + n.b};
 }
-HAMELIN_INLINE Screw operator*(const Screw& m, double k) noexcept {
+template <class S>
+HAMELIN_INLINE Screw<S> operator*(const Screw<S>& m, const std::type_identity_t<S>& k) noexcept {
   return {m.a * k, m.b * k};
 }
 /// m × n of twists.
-HAMELIN_INLINE Screw bracket(const Screw& m, const Screw& n) noexcept {
+template <class S>
+HAMELIN_INLINE Screw<S> bracket(const Screw<S>& m, const Screw<S>& n) noexcept {
   return {cross(m.a, n.a), cross(m.a, n.b) + cross(m.b, n.a)};
 }
-HAMELIN_INLINE double dot(const Screw& m, const Screw& f) noexcept {
+template <class S>
+HAMELIN_INLINE S dot(const Screw<S>& m, const Screw<S>& f) noexcept {
   return dot(m.a, f.a) + dot(m.b, f.b);
 }
 /// m ×* f of a twist and a wrench.
-HAMELIN_INLINE Screw bracket_wrench(const Screw& m, const Screw& f) noexcept {
+template <class S>
+HAMELIN_INLINE Screw<S> bracket_wrench(const Screw<S>& m, const Screw<S>& f) noexcept {
   return {cross(m.a, f.a) + cross(m.b, f.b), cross(m.a, f.b)};
 }
 
 /// Mass, Σ m r and Σ m r rᵀ of particles about the reference point.
+template <class S>
 struct Inertia {
-  double mass;
-  Vec3<double> moment;
-  Sym3<double> second;
+  S mass;
+  Vec3<S> moment;
+  Sym3<S> second;
 };
-HAMELIN_INLINE Inertia operator+(const Inertia& p, const Inertia& q) noexcept {
+template <class S>
+HAMELIN_INLINE Inertia<S> operator+(const Inertia<S>& p, const Inertia<S>& q) noexcept {
   return {p.mass + q.mass, p.moment + q.moment, p.second + q.second};
 }
 
 /// Sums over a link and all links outboard, docs/theory.md (2.26), (2.27).
+template <class S>
 struct Outboard {
-  Inertia inertia;
-  Vec3<double> momentum;
-  Mat3<double> flow;
-  Screw wrench;
+  Inertia<S> inertia;
+  Vec3<S> momentum;
+  Mat3<S> flow;
+  Screw<S> wrench;
 };
-HAMELIN_INLINE Outboard operator+(const Outboard& p, const Outboard& q) noexcept {
+template <class S>
+HAMELIN_INLINE Outboard<S> operator+(const Outboard<S>& p, const Outboard<S>& q) noexcept {
   return {p.inertia + q.inertia, p.momentum + q.momentum, p.flow + q.flow, p.wrench + q.wrench};
 }
 /// The same for the energies, with the momentum as a wrench: docs/theory.md (2.30).
+template <class S>
 struct OutboardMomentum {
-  Inertia inertia;
-  Screw momentum;
+  Inertia<S> inertia;
+  Screw<S> momentum;
 };
-HAMELIN_INLINE double trace(const Sym3<double>& a) noexcept {
+template <class S>
+HAMELIN_INLINE S trace(const Sym3<S>& a) noexcept {
   return a.xx + a.yy + a.zz;
 }
-HAMELIN_INLINE double trace(const Mat3<double>& a) noexcept {
+template <class S>
+HAMELIN_INLINE S trace(const Mat3<S>& a) noexcept {
   return a.x.x + a.y.y + a.z.z;
 }
 /// I m.
-HAMELIN_INLINE Screw operator*(const Inertia& I, const Screw& m) noexcept {
+template <class S>
+HAMELIN_INLINE Screw<S> operator*(const Inertia<S>& I, const Screw<S>& m) noexcept {
   return {m.a * trace(I.second) - I.second * m.a + cross(I.moment, m.b),
           m.b * I.mass + cross(m.a, I.moment)};
 }
 /// 2B m.
-HAMELIN_INLINE Screw coriolis_times(const Outboard& o, const Screw& m) noexcept {
+template <class S>
+HAMELIN_INLINE Screw<S> coriolis_times(const Outboard<S>& o, const Screw<S>& m) noexcept {
   return {(m.a * trace(o.flow) - o.flow * m.a) * 2.0, cross(m.a, o.momentum) * 2.0};
 }
 
 /// The inertia of a link about the reference point.
-HAMELIN_INLINE Inertia placed(const DerivativeLink& l, const DerivativeFrame& f) noexcept {
-  const Vec3<double> h = f.x * l.moment.x + f.y * l.moment.y + f.z * l.moment.z,
-                     moment = h + f.p * l.mass;
+template <class S>
+HAMELIN_INLINE Inertia<S> placed(const DerivativeLink& l, const PlacedFrame<S>& f) noexcept {
+  const Vec3<S> h = f.x * l.moment.x + f.y * l.moment.y + f.z * l.moment.z,
+                moment = h + f.p * l.mass;
   // R E Rᵀ + h pᵀ + p (h + m p)ᵀ
   const Sym3<double>& e = l.second;
-  const Vec3<double> ex = f.x * e.xx + f.y * e.xy + f.z * e.xz,
-                     ey = f.x * e.xy + f.y * e.yy + f.z * e.yz,
-                     ez = f.x * e.xz + f.y * e.yz + f.z * e.zz;
-  const auto entry = [&](double Vec3<double>::*i, double Vec3<double>::*k) {
+  const Vec3<S> ex = f.x * e.xx + f.y * e.xy + f.z * e.xz,
+                ey = f.x * e.xy + f.y * e.yy + f.z * e.yz,
+                ez = f.x * e.xz + f.y * e.yz + f.z * e.zz;
+  const auto entry = [&](S Vec3<S>::*i, S Vec3<S>::*k) {
     return ex.*i * f.x.*k + ey.*i * f.y.*k + ez.*i * f.z.*k + h.*i * f.p.*k + f.p.*i * moment.*k;
   };
-  using V = Vec3<double>;
+  using V = Vec3<S>;
   return {l.mass,
           moment,
           {entry(&V::x, &V::x), entry(&V::x, &V::y), entry(&V::x, &V::z), entry(&V::y, &V::y),
@@ -113,13 +134,14 @@ HAMELIN_INLINE Inertia placed(const DerivativeLink& l, const DerivativeFrame& f)
 }
 
 /// A link with its velocity and acceleration.
-HAMELIN_INLINE Outboard single(const DerivativeLink& l, const DerivativeFrame& f,
-                               const Screw& velocity, const Screw& acceleration) noexcept {
-  Outboard o;
+template <class S>
+HAMELIN_INLINE Outboard<S> single(const DerivativeLink& l, const PlacedFrame<S>& f,
+                                  const Screw<S>& velocity, const Screw<S>& acceleration) noexcept {
+  Outboard<S> o;
   o.inertia = placed(l, f);
-  const Vec3<double>& moment = o.inertia.moment;
+  const Vec3<S>& moment = o.inertia.moment;
   o.momentum = velocity.b * l.mass + cross(velocity.a, moment);
-  const Mat3<double> turned = hat_times(velocity.a, full(o.inertia.second));
+  const Mat3<S> turned = hat_times(velocity.a, full(o.inertia.second));
   o.flow = {turned.x + moment * velocity.b.x, turned.y + moment * velocity.b.y,
             turned.z + moment * velocity.b.z};
   o.wrench = o.inertia * acceleration + bracket_wrench(velocity, o.inertia * velocity);
@@ -127,18 +149,19 @@ HAMELIN_INLINE Outboard single(const DerivativeLink& l, const DerivativeFrame& f
 }
 
 /// The screw of a joint about the reference point.
-HAMELIN_INLINE Screw screw_of(const DerivativeLink& l, const DerivativeFrame& f) noexcept {
-  return l.prismatic ? Screw{{0.0, 0.0, 0.0}, f.axis} : Screw{f.axis, cross(f.p, f.axis)};
+template <class S>
+HAMELIN_INLINE Screw<S> screw_of(const DerivativeLink& l, const PlacedFrame<S>& f) noexcept {
+  return l.prismatic ? Screw<S>{{0.0, 0.0, 0.0}, f.axis} : Screw<S>{f.axis, cross(f.p, f.axis)};
 }
 
 /// The screws of all joints, number by number, so that a row of the derivatives is computed in
 /// lanes.
 struct AxisRows {
   double* row[6];
-  HAMELIN_INLINE Screw at(std::size_t j) const noexcept {
+  HAMELIN_INLINE Screw<double> at(std::size_t j) const noexcept {
     return {{row[0][j], row[1][j], row[2][j]}, {row[3][j], row[4][j], row[5][j]}};
   }
-  HAMELIN_INLINE void set(std::size_t j, const Screw& s) const noexcept {
+  HAMELIN_INLINE void set(std::size_t j, const Screw<double>& s) const noexcept {
     row[0][j] = s.a.x, row[1][j] = s.a.y, row[2][j] = s.a.z;
     row[3][j] = s.b.x, row[4][j] = s.b.y, row[5][j] = s.b.z;
   }
@@ -149,15 +172,15 @@ struct DerivativeScratch {
   std::size_t n, ld;
   AxisRows screw, first, second;
   double *rows_q, *rows_v;  ///< n × ld: rows of derivatives up to the diagonal
-  Outboard* outboard;
-  OutboardMomentum* momenta;
+  Outboard<double>* outboard;
+  OutboardMomentum<double>* momenta;
 
   HAMELIN_INLINE static std::size_t padded(std::size_t n) noexcept {
     return (n + 7) & ~std::size_t{7};
   }
   HAMELIN_INLINE static std::size_t bytes(std::size_t n) noexcept {
     return (18 + 2 * n) * padded(n) * sizeof(double) +
-           n * (sizeof(Outboard) + sizeof(OutboardMomentum));
+           n * (sizeof(Outboard<double>) + sizeof(OutboardMomentum<double>));
   }
   HAMELIN_INLINE static DerivativeScratch at(void* memory, std::size_t n) noexcept {
     DerivativeScratch s{};
@@ -173,22 +196,24 @@ struct DerivativeScratch {
       for (double*& row : rows->row) row = take(1);
     s.rows_q = take(n);
     s.rows_v = take(n);
-    s.outboard = reinterpret_cast<Outboard*>(at);
-    s.momenta = reinterpret_cast<OutboardMomentum*>(s.outboard + n);
+    s.outboard = reinterpret_cast<Outboard<double>*>(at);
+    s.momenta = reinterpret_cast<OutboardMomentum<double>*>(s.outboard + n);
     return s;
   }
 };
 
-/// docs/theory.md (2.24), (2.25)
-HAMELIN_INLINE void sweep_outwards(const DerivativeScratch& k, const DerivativeLink* links,
-                                   const DerivativeFrame* frames, const Vec3<double>& gravity,
-                                   const double* v, const double* a) noexcept {
-  const Vec3<double> zero{0.0, 0.0, 0.0};
-  Screw velocity{zero, zero}, acceleration{zero, zero - gravity};
+/// The screws of all joints and sums of links from the root on, docs/theory.md (2.24), (2.25).
+/// `frame_of(i)` is called for one link after the other.
+template <class S, class Scratch, class FrameOf>
+HAMELIN_INLINE void sweep_outwards(const Scratch& k, const DerivativeLink* links,
+                                   FrameOf&& frame_of, const Vec3<double>& gravity, const S* v,
+                                   const S* a) noexcept {
+  const Vec3<S> zero{0.0, 0.0, 0.0}, down{gravity.x, gravity.y, gravity.z};
+  Screw<S> velocity{zero, zero}, acceleration{zero, zero - down};
   for (std::size_t i = 0; i < k.n; ++i) {
-    const DerivativeFrame& f = frames[i];
-    const Screw screw = screw_of(links[i], f);
-    const Screw first = bracket(velocity, screw);
+    const auto& f = frame_of(i);
+    const Screw<S> screw = screw_of(links[i], f);
+    const Screw<S> first = bracket(velocity, screw);
     k.screw.set(i, screw);
     k.first.set(i, first);
     k.second.set(i, bracket(acceleration, screw) + bracket(velocity, first));
@@ -198,11 +223,28 @@ HAMELIN_INLINE void sweep_outwards(const DerivativeScratch& k, const DerivativeL
   }
 }
 
+/// What the products of docs/theory.md (2.28) take of joint i: wrenches, and a moment.
+template <class S>
+struct JointWrenches {
+  Screw<S> by_q, by_v, inertial;
+  Vec3<S> row;
+};
+template <class S>
+HAMELIN_INLINE JointWrenches<S> wrenches_of(const Outboard<S>& o, const Screw<S>& screw,
+                                            const Screw<S>& first,
+                                            const Screw<S>& second) noexcept {
+  return {
+      coriolis_times(o, first) + o.inertia * second + bracket_wrench(screw, o.wrench),
+      coriolis_times(o, screw) + o.inertia * first * 2.0, o.inertia * screw,
+      (screw.a * trace(o.flow) - transposed_times(o.flow, screw.a) + cross(o.momentum, screw.b)) *
+          2.0};
+}
+
 using NativePack = Lanes<native_lanes>;
 
 /// out[j] = rows[j]·f for all j in packets up to `count`. Adds to what is there if `add`.
 template <bool add>
-HAMELIN_INLINE void products(const AxisRows& rows, const Screw& f, std::size_t count,
+HAMELIN_INLINE void products(const AxisRows& rows, const Screw<double>& f, std::size_t count,
                              double* out) noexcept {
   const double factor[] = {f.a.x, f.a.y, f.a.z, f.b.x, f.b.y, f.b.z};
   for (std::size_t j = 0; j < count; j += native_lanes) {
@@ -229,23 +271,17 @@ HAMELIN_INLINE void sweep_inwards(const DerivativeScratch& k, const DerivativeLi
                                   double* dq, double* dv, double* M) noexcept {
   const std::size_t ld = k.ld;
   for (std::size_t i = k.n; i-- > 0;) {
-    const Outboard& o = k.outboard[i];
-    const Screw screw = k.screw.at(i), first = k.first.at(i);
-    const Screw column = o.inertia * screw;
-    const Vec3<double> row =
-        (screw.a * trace(o.flow) - transposed_times(o.flow, screw.a) + cross(o.momentum, screw.b)) *
-        2.0;
-    const Screw by_q =
-        coriolis_times(o, first) + o.inertia * k.second.at(i) + bracket_wrench(screw, o.wrench);
-    const Screw by_v = coriolis_times(o, screw) + o.inertia * first * 2.0;
+    const Outboard<double>& o = k.outboard[i];
+    const auto [by_q, by_v, inertial, row] =
+        wrenches_of(o, k.screw.at(i), k.first.at(i), k.second.at(i));
     const std::size_t count = i + 1;
     products<false>(k.screw, by_q, count, dq + i * ld);
     products<false>(k.screw, by_v, count, dv + i * ld);
-    products<false>(k.screw, column, count, M + i * ld);
+    products<false>(k.screw, inertial, count, M + i * ld);
     products<false>(k.first, row, count, k.rows_q + i * ld);
-    products<true>(k.second, column, count, k.rows_q + i * ld);
+    products<true>(k.second, inertial, count, k.rows_q + i * ld);
     products<false>(k.screw, row, count, k.rows_v + i * ld);
-    products<true>(k.first, column * 2.0, count, k.rows_v + i * ld);
+    products<true>(k.first, inertial * 2.0, count, k.rows_v + i * ld);
     M[i + i * ld] += links[i].armature;
     if (i > 0) k.outboard[i - 1] = k.outboard[i - 1] + o;
   }
@@ -277,19 +313,19 @@ HAMELIN_INLINE void kinetic_hessian(const DerivativeScratch& k, const Derivative
                                     const KineticOutput& out) noexcept {
   const std::size_t ld = k.ld;
   const Vec3<double> zero{0.0, 0.0, 0.0};
-  Screw velocity{zero, zero};
+  Screw<double> velocity{zero, zero};
   for (std::size_t i = 0; i < k.n; ++i) {
-    const Screw screw = screw_of(links[i], frames[i]);
+    const Screw<double> screw = screw_of(links[i], frames[i]);
     k.screw.set(i, screw);
     k.first.set(i, bracket(velocity, screw));
     velocity = velocity + screw * v[i];
-    const Inertia inertia = placed(links[i], frames[i]);
+    const Inertia<double> inertia = placed(links[i], frames[i]);
     k.momenta[i] = {inertia, inertia * velocity};
   }
   for (std::size_t i = k.n; i-- > 0;) {
-    const OutboardMomentum& o = k.momenta[i];
-    const Screw screw = k.screw.at(i), first = k.first.at(i), column = o.inertia * screw,
-                turned = o.inertia * first + bracket_wrench(screw, o.momentum);
+    const OutboardMomentum<double>& o = k.momenta[i];
+    const Screw<double> screw = k.screw.at(i), first = k.first.at(i), column = o.inertia * screw,
+                        turned = o.inertia * first + bracket_wrench(screw, o.momentum);
     const std::size_t count = i + 1;
     products<false>(k.screw, column, count, out.M + i * ld);
     products<false>(k.screw, turned, count, out.mixed + i * ld);
@@ -299,7 +335,7 @@ HAMELIN_INLINE void kinetic_hessian(const DerivativeScratch& k, const Derivative
     out.p[i] = dot(screw, o.momentum) + links[i].armature * v[i];
     out.dq[i] = dot(first, o.momentum);
     if (i > 0) {
-      OutboardMomentum& inboard = k.momenta[i - 1];
+      OutboardMomentum<double>& inboard = k.momenta[i - 1];
       inboard = {inboard.inertia + o.inertia, inboard.momentum + o.momentum};
     }
   }
@@ -319,7 +355,7 @@ HAMELIN_INLINE void potential_hessian(const DerivativeScratch& k, const Derivati
   double mass = 0.0;
   Vec3<double> moment{0.0, 0.0, 0.0};
   for (std::size_t i = 0; i < k.n; ++i) {
-    const Screw screw = screw_of(links[i], frames[i]);
+    const Screw<double> screw = screw_of(links[i], frames[i]);
     k.first.set(i, {cross(screw.a, gravity), screw.b});
   }
   for (std::size_t i = k.n; i-- > 0;) {
@@ -327,7 +363,7 @@ HAMELIN_INLINE void potential_hessian(const DerivativeScratch& k, const Derivati
     const DerivativeLink& l = links[i];
     mass += l.mass;
     moment = moment + f.x * l.moment.x + f.y * l.moment.y + f.z * l.moment.z + f.p * l.mass;
-    const Screw screw = screw_of(l, f);
+    const Screw<double> screw = screw_of(l, f);
     const Vec3<double> force = screw.b * mass + cross(screw.a, moment);
     products<false>(k.first, force, i + 1, out.Q + i * ld);
     out.dq[i] = -dot(force, gravity);

@@ -1,4 +1,5 @@
 #pragma once
+#include <utility>
 #include <variant>
 
 #include "hamelin/core/isa_kernels.hpp"
@@ -7,14 +8,18 @@
 
 namespace hamelin::dynamics::kernel {
 
-/// Calls f(entry, chain) with the entry for this model's kind of chain. This takes two branches per
-/// call.
+/// Calls f(entry, chain) with the entry for this kind of chain. This takes two branches per call.
+template <template <class> class Entry, class F>
+decltype(auto) with_group(const std::variant<model::SpatialChain, model::PlanarChain>& chain,
+                          bool has_prismatic_or_rotor, const Groups<Entry>& groups, F&& f) {
+  if (const auto* planar = std::get_if<model::PlanarChain>(&chain))
+    return f(has_prismatic_or_rotor ? groups.planar_mixed : groups.planar_plain, *planar);
+  return f(has_prismatic_or_rotor ? groups.spatial_mixed : groups.spatial_plain,
+           std::get<model::SpatialChain>(chain));
+}
 template <template <class> class Entry, class F>
 decltype(auto) with_group(const model::Model& model, const Groups<Entry>& groups, F&& f) {
-  if (const auto* planar = std::get_if<model::PlanarChain>(&model.chain()))
-    return f(model.has_prismatic_or_rotor() ? groups.planar_mixed : groups.planar_plain, *planar);
-  return f(model.has_prismatic_or_rotor() ? groups.spatial_mixed : groups.spatial_plain,
-           std::get<model::SpatialChain>(model.chain()));
+  return with_group(model.chain(), model.has_prismatic_or_rotor(), groups, std::forward<F>(f));
 }
 
 }  // namespace hamelin::dynamics::kernel

@@ -105,24 +105,13 @@ HAMELIN_INLINE double largest(Lanes<W> a) noexcept {
 /// Beyond this [rad] the range reduction below loses digits, and the C library is used.
 inline constexpr double largest_reduced_angle = 1e6;
 
-/// Sine and cosine of all lanes, accurate to 1.5 units in the last place up to 100 rad and to 2.5
-/// beyond. For |x| ≤ 1e6 there is no branch: range reduction to [−π/4, π/4] with π/2 in three parts
-/// (Cody and Waite), then the minimax polynomials of fdlibm.
+/// For |x| ≤ 1e6, without a branch: range reduction to [−π/4, π/4] with π/2 in three parts (Cody
+/// and Waite), then the minimax polynomials of fdlibm.
 template <int W>
-HAMELIN_INLINE void sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noexcept {
+HAMELIN_INLINE void reduced_sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noexcept {
   using Real = typename Lanes<W>::Real;
   using Bits = typename Lanes<W>::Bits;
   const Real x = angle.v;
-  const Lanes<W> size = abs(angle);
-  double most = size[0];  // ignores NaN; both paths below keep it
-  for (int i = 1; i < W; ++i) most = most <= size[i] ? size[i] : most;
-  if (__builtin_expect(!(most <= largest_reduced_angle), 0)) {
-    for (int i = 0; i < W; ++i) {
-      sine.v[i] = __builtin_sin(x[i]);
-      cosine.v[i] = __builtin_cos(x[i]);
-    }
-    return;
-  }
   // Adding 1.5·2^52 rounds to an integer, which is then in the low bits.
   constexpr double to_integer = 6755399441055744.0;
   const Real shifted = x * 0.63661977236758134308 + to_integer;
@@ -153,6 +142,32 @@ HAMELIN_INLINE void sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noe
   const Real a = odd ? c : s, b = odd ? s : c;
   sine.v = reinterpret_cast<Real>(reinterpret_cast<Bits>(a) ^ ((quadrant & 2) << 62));
   cosine.v = reinterpret_cast<Real>(reinterpret_cast<Bits>(b) ^ (((quadrant + 1) & 2) << 62));
+}
+
+/// Not inlined because it is rarely needed. Lanes do not depend on each other, so that a state has
+/// the same result beside any other states.
+template <int W>
+[[gnu::noinline, gnu::cold]] void any_sincos(Lanes<W> angle, Lanes<W>& sine,
+                                             Lanes<W>& cosine) noexcept {
+  reduced_sincos(angle, sine, cosine);
+  for (int i = 0; i < W; ++i) {
+    if (__builtin_fabs(angle[i]) <= largest_reduced_angle) continue;
+    sine.v[i] = __builtin_sin(angle[i]);
+    cosine.v[i] = __builtin_cos(angle[i]);
+  }
+}
+
+/// Sine and cosine of all lanes, accurate to 1.5 units in the last place up to 100 rad and to 2.5
+/// beyond.
+template <int W>
+HAMELIN_INLINE void sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noexcept {
+  const Lanes<W> size = abs(angle);
+  double most = size[0];  // ignores NaN, which both functions keep
+  for (int i = 1; i < W; ++i) most = most <= size[i] ? size[i] : most;
+  if (__builtin_expect(!(most <= largest_reduced_angle), 0))
+    any_sincos(angle, sine, cosine);
+  else
+    reduced_sincos(angle, sine, cosine);
 }
 
 /// As above for arrays, whose allocated size must be a multiple of 8. The width is at most 4,
