@@ -6,10 +6,8 @@
 /// Dense linear algebra on rows whose length is a multiple of `row_multiple`.
 namespace hamelin::integration::kernel {
 
-inline constexpr std::size_t row_multiple = 8;
-[[nodiscard]] constexpr std::size_t padded(std::size_t n) noexcept {
-  return (n + row_multiple - 1) / row_multiple * row_multiple;
-}
+using dynamics::kernel::padded;
+using dynamics::kernel::row_multiple;
 
 struct LinearKernels {
   /// Solves S X = R for the n rows of [S | R], each of padded(n) + `columns` numbers, by Gaussian

@@ -175,9 +175,6 @@ struct DerivativeScratch {
   Outboard<double>* outboard;
   OutboardMomentum<double>* momenta;
 
-  HAMELIN_INLINE static std::size_t padded(std::size_t n) noexcept {
-    return (n + 7) & ~std::size_t{7};
-  }
   HAMELIN_INLINE static std::size_t bytes(std::size_t n) noexcept {
     return (18 + 2 * n) * padded(n) * sizeof(double) +
            n * (sizeof(Outboard<double>) + sizeof(OutboardMomentum<double>));

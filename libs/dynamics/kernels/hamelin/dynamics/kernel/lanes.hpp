@@ -14,6 +14,13 @@
 #endif
 
 namespace hamelin::dynamics::kernel {
+
+/// Rows and arrays of numbers are padded to a multiple of this, which fits registers of every set.
+inline constexpr std::size_t row_multiple = 8;
+[[nodiscard]] HAMELIN_INLINE constexpr std::size_t padded(std::size_t n) noexcept {
+  return (n + row_multiple - 1) / row_multiple * row_multiple;
+}
+
 inline namespace HAMELIN_ISA_NAMESPACE {
 
 /// The number of doubles in a register.

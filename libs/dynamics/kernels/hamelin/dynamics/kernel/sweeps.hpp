@@ -30,9 +30,6 @@ struct Scratch {
   S *angle, *sine, *cosine;  ///< their sizes are multiples of native_lanes
 
   static constexpr std::size_t alignment = 64;
-  HAMELIN_INLINE static std::size_t padded(std::size_t n) noexcept {
-    return (n + 7) & ~std::size_t{7};
-  }
   HAMELIN_INLINE static std::size_t bytes(std::size_t n) noexcept {
     return 3 * padded(n) * sizeof(S) + n * sizeof(LinkScratch<Space>);
   }
