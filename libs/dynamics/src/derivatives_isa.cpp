@@ -12,7 +12,7 @@ std::size_t bytes(std::size_t links) noexcept {
   return DerivativeScratch::bytes(links);
 }
 std::size_t leading(std::size_t links) noexcept {
-  return padded(links);
+  return kernel::padded(links);
 }
 void inverse_dynamics(std::size_t n, void* memory, const kernel::DerivativeLink* links,
                       const kernel::DerivativeFrame* frames, const geometry::Vec3<double>& gravity,
