@@ -11,9 +11,9 @@ using hamelin::test::Sandbox;
 const char* const identified_scene = R"({
   "schema": "hamelin.scene/1",
   "robot": {"file": "data/robots/arm7.urdf"},
-  "start": {"q": [0, 0, 0, -1.2, 0, 1.2, 0]},
-  "goals": [{"type": "joint", "q": [1.2, 0.8, -0.9, -0.4, 1.3, -0.6, 1.1]},
-            {"type": "joint", "q": [-0.9, -0.7, 1.0, -1.9, -1.2, 1.6, -1.2]}],
+  "start": {"q": [0, 0, 0, -1.2, 0, 1.6, 0]},
+  "goals": [{"type": "joint", "q": [1.2, 0.8, -0.9, -0.4, 1.3, 0.6, 1.1]},
+            {"type": "joint", "q": [-0.9, -0.7, 1.0, -1.9, -1.2, 2.6, -1.2]}],
   "model": {"joint_damping": 2.0, "friction": 1.0, "torque_limits": false},
   "actuation": {"type": "sampled"},
   "safety": {"type": "none"},
