@@ -59,7 +59,8 @@ class StateBlocks {
     const Call call(states, stride, results, threads_);
     std::vector<std::jthread> others;
     for (std::size_t thread = 1; thread < threads_; ++thread)
-      others.emplace_back([&, thread] { share(call, thread, f); });
+      if (call.begin(thread) < call.begin(thread + 1))
+        others.emplace_back([&, thread] { share(call, thread, f); });
     share(call, 0, f);
   }
 

@@ -146,6 +146,7 @@ void check_batches(const Model& model, int states, std::uint64_t seed) {
     calls.run(batch);
     CHECK(worst_difference(model, calls) <= 1e-12);
     for (auto* result : calls.results()) CHECK(result->is_untouched_beyond());
+    if (isa != default_isa()) continue;  // threads share states the same way on every set
     for (const int threads : {2, 5}) {
       rng = Rng(seed);
       BatchCalls shared(model.dof(), states, states % 3, rng);
@@ -261,16 +262,17 @@ TEST_CASE("results too large for the caches are those of small calls", "[dynamic
   StatesXd M = StatesXd::Constant(49, q.cols(), -7.0),
            poses = StatesXd::Constant(12, q.cols(), -7.0),
            J = StatesXd::Constant(42, q.cols(), -7.0);
-  DynamicsBatch batch(model, {.threads = threads});
-  FrameBatch frames(model, Model::tip_frame, {.threads = threads});
+  DynamicsBatch batch(model, {.threads = threads}), alone(model);
+  FrameBatch frames(model, Model::tip_frame, {.threads = threads}),
+      frames_alone(model, Model::tip_frame);
   batch.mass_matrix(at(q), at(M));
   frames.evaluate(at(q), at(poses), at(J));
   StatesXd some(7, piece), some_M(49, piece), some_poses(12, piece), some_J(42, piece);
   bool same = true;
   for (Index first = 0; first < states; first += piece) {
     some = at(q).middleCols(first, piece);
-    batch.mass_matrix(some, some_M);
-    frames.evaluate(some, some_poses, some_J);
+    alone.mass_matrix(some, some_M);
+    frames_alone.evaluate(some, some_poses, some_J);
     same = same && some_M == at(M).middleCols(first, piece) &&
            some_poses == at(poses).middleCols(first, piece) &&
            some_J == at(J).middleCols(first, piece);
