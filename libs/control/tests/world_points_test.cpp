@@ -308,7 +308,7 @@ TEST_CASE("a sensor on a frame of the arm sees from where the frame was", "[cont
   Room room;
   room.scene.map->points.margin_m = 0.0;
   room.make();
-  const std::string name = GENERATE(as<std::string>(), "the tip", "panda_link5", "panda_link0");
+  const std::string name = GENERATE(as<std::string>(), "the tip", "link5");
   CAPTURE(name);
   dynamics::Workspace ws(room.arm);
   VectorXd q = room.scene.start_q;
@@ -338,8 +338,8 @@ TEST_CASE("frames that make no sense are refused in one line, and the world is u
   const double nan = std::nan("");
   control::PointFrame frame = wall_at(0.6);
   frame.mount = scene::Mount::frame;
-  frame.frame = "panda_link55";
-  refused(frame, "points: the sensor's mount: no frame 'panda_link55'");
+  frame.frame = "link55";
+  refused(frame, "points: the sensor's mount: 'arm7' has no frame 'link55'");
   frame = wall_at(0.6);
   frame.points(1, 7) = std::nanf("");
   refused(frame, "points: one is not finite");

@@ -199,14 +199,14 @@ py::object potential_energy(BoundModel& bound, py::handle q) {
 
 py::array_t<double> per_joint(const BoundModel& bound, std::optional<double> model::Joint::*member,
                               double none) {
-  Eigen::VectorXd x;
+  Eigen::VectorXd x(bound.model.dof());
   for (int i = 0; i < bound.model.dof(); ++i)
     x[i] = (bound.model.robot().links[static_cast<std::size_t>(i)].joint.*member).value_or(none);
   return to_array(x);
 }
 
 py::array_t<double> per_joint(const BoundModel& bound, double model::Joint::*member) {
-  Eigen::VectorXd x;
+  Eigen::VectorXd x(bound.model.dof());
   for (int i = 0; i < bound.model.dof(); ++i)
     x[i] = bound.model.robot().links[static_cast<std::size_t>(i)].joint.*member;
   return to_array(x);

@@ -298,3 +298,10 @@ def test_contacts_agree_with_clearance(scenes):
     first = contacts[0]
     gap = np.linalg.norm(first["obstacle_point_m"] - centers[first["shape"]])
     np.testing.assert_allclose(gap - radius[first["shape"]], first["distance_m"], atol=1e-9)
+
+
+def test_limits_of_joints(arm, robots):
+    links = hamelin.robot_info(robots / "arm7.urdf")["links"]
+    for name in ("lower", "upper", "velocity_max", "effort_max", "damping"):
+        given = [np.inf if link[name] is None else link[name] for link in links]
+        assert np.array_equal(getattr(arm, name), given)

@@ -276,7 +276,7 @@ TEST_CASE("points from C become part of the map, and what makes no sense is refu
   frame.mount = HAMELIN_MOUNT_FRAME;
   CHECK_THAT(loop.failure(insert()), Contains("frame: frame: is null"));
   frame.frame = "none";
-  CHECK_THAT(loop.failure(insert()), Contains("the sensor's mount: no frame 'none'"));
+  CHECK_THAT(loop.failure(insert()), Contains("the sensor's mount: 'arm7' has no frame 'none'"));
   frame.struct_size = offsetof(hamelin_point_frame, frame);  // of an older header
   CHECK_THAT(loop.failure(insert()), Contains("frame: frame: is null"));
   frame.struct_size = sizeof frame;
