@@ -8,7 +8,6 @@
 
 #include "../src/local_polynomial.hpp"
 #include "../tests/motions.hpp"
-#include "hamelin/description/robot_io.hpp"
 #include "hamelin/identification/identify.hpp"
 #include "hamelin/identification/pseudo_inertia.hpp"
 
@@ -19,12 +18,6 @@ using namespace hamelin::identification;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-model::Robot read(const std::string& file) {
-  const std::string path = std::string(HAMELIN_SOURCE_DIR) + "/data/robots/" + file;
-  if (file.ends_with("panda.urdf")) return description::read_robot(path, {"panda_grasptarget", {}});
-  return description::read_robot(path);
-}
 
 // Positions, rates and accelerations of local polynomials against the torques as they are.
 Samples pointwise_samples(const model::Model& model, const Record& record, double window_s) {
@@ -80,17 +73,7 @@ int links_that_are_no_bodies(const Parameters& parameters) {
 // Errors on the exact states of another motion.
 TorqueErrors errors_on(const model::Model& truth, const test::SineMotion& motion,
                        const Parameters& parameters) {
-  const int count = 1000;
-  MatrixXd q(truth.dof(), count), v = q, a = q, tau = q;
-  dynamics::Workspace ws(truth);
-  for (int k = 0; k < count; ++k) {
-    const auto state = motion.at(0.01 * k);
-    q.col(k) = state.q;
-    v.col(k) = state.v;
-    a.col(k) = state.a;
-    tau.col(k) = test::motor_torque(truth, ws, state);
-  }
-  return torque_errors(exact_samples(truth, q, v, a, tau, test::friction_speed), parameters);
+  return torque_errors(test::samples_along(truth, motion, 1000, 0.01), parameters);
 }
 
 struct Score {
@@ -108,7 +91,7 @@ struct Score {
 };
 
 void ablate(const std::string& file, double period_s, double duration_s) {
-  const model::Model truth(test::with_friction(read(file), 1.0, 0.8));
+  const model::Model truth(test::with_friction(test::data_robot(file), 1.0, 0.8));
   const model::Model prior(test::wrong_prior(truth.robot(), 0.3));
   Score before, full, plain, point_short, point_long;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -147,7 +130,7 @@ TEST_CASE("ablation") {
 }
 
 TEST_CASE("time") {
-  const model::Model truth(test::with_friction(read("arm7.urdf"), 1.0, 0.8));
+  const model::Model truth(test::with_friction(test::data_robot("arm7.urdf"), 1.0, 0.8));
   const Record record =
       test::simulated_record(truth, test::SineMotion(truth, 1), {.q_noise = 1e-4});
   BENCHMARK("identify, 7 joints, 10 s at 1 kHz") {

@@ -240,6 +240,7 @@ class Rows {
         ws_(model),
         P_(model.dof(), 10 * model.dof()),
         L_(P_),
+        unused_(P_),
         torque_(model.dof()) {
     samples_.joints.assign(static_cast<std::size_t>(model.dof()),
                            {MatrixXd::Zero(count, 10 * model.dof() + 2), VectorXd::Zero(count)});
@@ -248,7 +249,7 @@ class Rows {
   void add(const Piece& piece, const Windowing& windowing) {
     for (Index k = 0; k < piece.intervals(); ++k) {
       dynamics::momentum_regressor(model_, ws_, piece.q.col(k), piece.mean_rate.col(k), P_, L_);
-      dynamics::momentum_regressor(model_, ws_, piece.q.col(k), piece.v.col(k), unused(), L_);
+      dynamics::momentum_regressor(model_, ws_, piece.q.col(k), piece.v.col(k), unused_, L_);
       windowing.for_each(piece, k, [&](Index i, const Window& window) {
         add_interval(piece, k, window, first_row_ + i);
       });
@@ -260,10 +261,6 @@ class Rows {
   [[nodiscard]] Samples& samples() noexcept { return samples_; }
 
  private:
-  MatrixXd& unused() {
-    unused_.resize(P_.rows(), P_.cols());
-    return unused_;
-  }
   void add_interval(const Piece& piece, Index k, const Window& window, Index row);
   void average_torque(const Piece& piece, Index k, const Window& window);
 
@@ -271,7 +268,7 @@ class Rows {
   const Record& record_;
   double friction_speed_;
   dynamics::Workspace ws_;
-  MatrixXd P_, L_, unused_;
+  MatrixXd P_, L_, unused_;  ///< P at mean rates, L at smooth ones; P at these is not needed
   VectorXd torque_;
   Samples samples_;
   Index first_row_ = 0;

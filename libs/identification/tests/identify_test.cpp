@@ -4,11 +4,9 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <vector>
 
-#include "hamelin/description/robot_io.hpp"
 #include "hamelin/identification/pseudo_inertia.hpp"
 #include "hamelin/test/errors.hpp"
 #include "motions.hpp"
@@ -20,24 +18,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-model::Robot data_robot(const char* file) {
-  const std::filesystem::path path =
-      std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/robots" / file;
-  if (path.stem() == "panda") return description::read_robot(path, {"panda_grasptarget", {}});
-  return description::read_robot(path);
-}
-
 Samples samples_of(const model::Model& model, const test::SineMotion& motion, int count) {
-  MatrixXd q(model.dof(), count), v = q, a = q, tau = q;
-  dynamics::Workspace ws(model);
-  for (int k = 0; k < count; ++k) {
-    const auto state = motion.at(0.05 * k);
-    q.col(k) = state.q;
-    v.col(k) = state.v;
-    a.col(k) = state.a;
-    tau.col(k) = test::motor_torque(model, ws, state);
-  }
-  return exact_samples(model, q, v, a, tau, test::friction_speed);
+  return test::samples_along(model, motion, count, 0.05);
 }
 
 bool all_bodies(const model::Model& model, const Parameters& parameters) {
@@ -54,7 +36,7 @@ bool all_bodies(const model::Model& model, const Parameters& parameters) {
 TEST_CASE("exact samples give the torques of another motion", "[identification][unit]") {
   const auto* file = GENERATE("arm7.urdf", "rail7.urdf", "planar4.json");
   CAPTURE(file);
-  model::Robot robot = test::with_friction(data_robot(file), 1.0, 0.7);
+  model::Robot robot = test::with_friction(test::data_robot(file), 1.0, 0.7);
   robot.links[1].joint.armature = 0.3;
   const model::Model truth(robot), prior(test::wrong_prior(robot, 0.3));
   const Fit found = fit(prior, samples_of(truth, test::SineMotion(truth, 1), 600), {}, "exact");
@@ -80,7 +62,7 @@ TEST_CASE("noisy positions and held torques give the torques of another motion w
       Case{"arm7.urdf", 1e-3, 1e-4, 0.0, 1}, Case{"arm7.urdf", 8e-3, 1e-4, 0.01, 2},
       Case{"third_party/panda.urdf", 1e-3, 1e-4, 0.0, 3}, Case{"gantry.urdf", 2e-3, 1e-4, 0.01, 4});
   CAPTURE(c.file, c.period_s, c.seed);
-  const model::Model truth(test::with_friction(data_robot(c.file), 1.0, 0.8));
+  const model::Model truth(test::with_friction(test::data_robot(c.file), 1.0, 0.8));
   const model::Model prior(test::wrong_prior(truth.robot(), 0.3));
   const Record record = test::simulated_record(truth, test::SineMotion(truth, 10 + c.seed),
                                                {.duration_s = 10.0,
@@ -109,7 +91,7 @@ TEST_CASE("noisy positions and held torques give the torques of another motion w
 }
 
 TEST_CASE("standard errors of damping are those of repeated records", "[identification][slow]") {
-  const model::Model truth(test::with_friction(data_robot("spatial3.json"), 1.0, 0.5));
+  const model::Model truth(test::with_friction(test::data_robot("spatial3.json"), 1.0, 0.5));
   const model::Model prior(test::wrong_prior(truth.robot(), 0.2));
   const test::SineMotion motion(truth, 5);
   VectorXd sum = VectorXd::Zero(3), squares = sum, predicted = sum;
@@ -137,7 +119,7 @@ TEST_CASE("standard errors of damping are those of repeated records", "[identifi
 
 TEST_CASE("links stay bodies whatever the data, and unexcited ones stay as they were",
           "[identification][unit]") {
-  const model::Model truth(data_robot("arm7.urdf"));
+  const model::Model truth(test::data_robot("arm7.urdf"));
   Samples samples = samples_of(truth, test::SineMotion(truth, 1), 60);
   Rng rng(4);
   for (auto& joint : samples.joints)
@@ -158,7 +140,7 @@ TEST_CASE("links stay bodies whatever the data, and unexcited ones stay as they 
 
 TEST_CASE("joints that stay and links without mass keep what the robot says",
           "[identification][unit]") {
-  model::Robot robot = test::with_friction(data_robot("planar4.json"), 1.0, 0.7);
+  model::Robot robot = test::with_friction(test::data_robot("planar4.json"), 1.0, 0.7);
   const model::Model truth(robot);
   MatrixXd q(4, 200), v = q, a = q, tau = q;
   dynamics::Workspace ws(truth);
@@ -192,7 +174,7 @@ TEST_CASE("joints that stay and links without mass keep what the robot says",
 }
 
 TEST_CASE("the same record gives the same bytes", "[identification][unit]") {
-  const model::Model truth(data_robot("spatial3.json"));
+  const model::Model truth(test::data_robot("spatial3.json"));
   const Record record = test::simulated_record(
       truth, test::SineMotion(truth, 1), {.duration_s = 4.0, .period_s = 4e-3, .q_noise = 1e-4});
   const auto once = [&] { return to_json(identify(truth, record, {}), std::nullopt).dump(); };

@@ -4,15 +4,18 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "hamelin/core/rng.hpp"
+#include "hamelin/description/robot_io.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/identification/fit.hpp"
 #include "hamelin/identification/record.hpp"
+#include "hamelin/identification/samples.hpp"
 #include "hamelin/integration/integrator.hpp"
 
 /// Motions of simulated arms with their torques.
@@ -173,6 +176,28 @@ inline identification::TorqueErrors errors_along(const model::Model& truth,
         {std::sqrt(differences[j] / states), std::sqrt(differences[j] / torques[j])});
   out.all = {std::sqrt(differences.sum() / states), std::sqrt(differences.sum() / torques.sum())};
   return out;
+}
+
+/// The exact states and torques of a motion, `step_s` apart.
+inline identification::Samples samples_along(const model::Model& model, const SineMotion& motion,
+                                             int count, double step_s) {
+  Eigen::MatrixXd q(model.dof(), count), v = q, a = q, tau = q;
+  dynamics::Workspace ws(model);
+  for (int k = 0; k < count; ++k) {
+    const auto state = motion.at(step_s * k);
+    q.col(k) = state.q;
+    v.col(k) = state.v;
+    a.col(k) = state.a;
+    tau.col(k) = motor_torque(model, ws, state);
+  }
+  return identification::exact_samples(model, q, v, a, tau, friction_speed);
+}
+
+/// A robot of data/robots.
+inline model::Robot data_robot(const std::filesystem::path& file) {
+  const auto path = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/robots" / file;
+  if (path.stem() == "panda") return description::read_robot(path, {"panda_grasptarget", {}});
+  return description::read_robot(path);
 }
 
 }  // namespace hamelin::test
