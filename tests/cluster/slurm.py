@@ -156,6 +156,19 @@ def release(job):
                            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
 
 
+def signal_task(task, signal):
+    """Signals the script of a task. While Slurm still starts it, it asks callers to try again later."""
+    end = time.monotonic() + 60
+    while True:
+        done = subprocess.run(["scancel", "--batch", f"--signal={signal}", task],
+                              stderr=subprocess.PIPE, text=True)  # fmt: skip
+        if done.returncode == 0:
+            return
+        if "try again later" not in done.stderr or time.monotonic() > end:
+            sys.exit(f"scancel, task {task}: {done.stderr}")
+        time.sleep(0.2)
+
+
 def execute(study, shards):
     directory, script = study.plan(f"slurm-{shards}"), study.root / f"slurm-{shards}.sbatch"
     call(
@@ -185,11 +198,12 @@ def time_limit(study):
             break
         time.sleep(0.1)
     time.sleep(0.5)  # until the script has begun
-    call("scancel", "--batch", "--signal=USR1", f"{job}_1")  # what Slurm sends before the limit
-    time.sleep(2)
-    state = call("scontrol", "show", "job", f"{job}_1")
-    if "Restarts=1" not in state:
-        sys.exit(f"the task has not queued itself again:\n{state}")
+    signal_task(f"{job}_1", "USR1")  # what Slurm sends before the limit
+    end = time.monotonic() + 60
+    while "Restarts=1" not in (state := call("scontrol", "show", "job", f"{job}_1")):
+        if time.monotonic() > end:
+            sys.exit(f"the task has not queued itself again:\n{state}")
+        time.sleep(0.2)
     release(job)
     wait_for(job, "time limit", 400)
     study.compare("Slurm, a task that queued itself again before its time limit", directory)
