@@ -110,6 +110,24 @@ set(HAMELIN_KERNEL_OPTIONS $<IF:$<BOOL:${HAMELIN_SANITIZE}>,-O1,-O3>
   -ffp-contract=fast -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize
   $<$<CXX_COMPILER_ID:GNU>:--param=sra-max-scalarization-size-Ospeed=4096>)
 
+# A build for one machine may leave the other instruction sets out.
+set(HAMELIN_INSTRUCTION_SETS "baseline;v3;v4" CACHE STRING "Instruction sets that kernels are compiled for")
+if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  set(HAMELIN_INSTRUCTION_SETS baseline)
+endif()
+set(HAMELIN_WITHOUT_ISA "")  # definitions of core
+foreach(name IN ITEMS baseline v3 v4)
+  if(NOT name IN_LIST HAMELIN_INSTRUCTION_SETS)
+    string(TOUPPER "HAMELIN_WITHOUT_${name}" definition)
+    list(APPEND HAMELIN_WITHOUT_ISA ${definition})
+  endif()
+endforeach()
+foreach(name IN LISTS HAMELIN_INSTRUCTION_SETS)
+  if(NOT name MATCHES "^(baseline|v3|v4)$")
+    message(FATAL_ERROR "HAMELIN_INSTRUCTION_SETS: '${name}' is not known, expected a list of baseline, v3 and v4")
+  endif()
+endforeach()
+
 # hamelin_isa_sources(TARGET SOURCE... [LINKS ...]): compiles each source once for every instruction
 # set of core/isa.hpp. docs/decisions/0006-instruction-sets.md says what such a source may use, and
 # a test checks the objects. Products may be contracted to FMA, because results are bit-identical on
@@ -117,15 +135,11 @@ set(HAMELIN_KERNEL_OPTIONS $<IF:$<BOOL:${HAMELIN_SANITIZE}>,-O1,-O3>
 function(hamelin_isa_sources target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "LINKS")
   set(sources ${arg_UNPARSED_ARGUMENTS})
-  set(names baseline)
-  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-    list(APPEND names v3 v4)
-  endif()
   set(flags_baseline "")
   set(flags_v3 -mavx2 -mfma)
   set(flags_v4 -mavx2 -mfma -mavx512f -mavx512vl -mavx512dq)
   set_source_files_properties(${sources} PROPERTIES COMPILE_OPTIONS "${HAMELIN_KERNEL_OPTIONS}")
-  foreach(name IN LISTS names)
+  foreach(name IN LISTS HAMELIN_INSTRUCTION_SETS)
     add_library(${target}_${name} OBJECT ${sources})
     target_link_libraries(${target}_${name} PRIVATE $<BUILD_INTERFACE:hamelin_options>
       $<FILTER:$<TARGET_PROPERTY:${target},INTERFACE_LINK_LIBRARIES>,EXCLUDE,LINK_ONLY> ${arg_LINKS})

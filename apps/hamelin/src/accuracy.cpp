@@ -76,8 +76,6 @@ int run_accuracy(const AccuracyFlags& flags) {
   return 0;
 }
 
-}  // namespace
-
 void add_accuracy(CLI::App& app, int& exit_code) {
   auto* command = add_command(app, "accuracy",
                               "Measure speed against error of integrators on a robot. Every "
@@ -141,5 +139,9 @@ void add_accuracy(CLI::App& app, int& exit_code) {
       ->type_name("PAGE.html");
   command->callback([flags, &exit_code] { exit_code = run_accuracy(*flags); });
 }
+
+const RegisteredCommand registered_accuracy("accuracy", add_accuracy);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -469,8 +469,6 @@ void add_list(CLI::App& parent, int& exit_code) {
   });
 }
 
-}  // namespace
-
 void add_bench(CLI::App& app, int& exit_code) {
   auto* bench = add_command(app, "bench", "Compare planners on a published set of problems",
                             "hamelin bench run --planner hybrid --planner apf -o results\n"
@@ -483,5 +481,9 @@ void add_bench(CLI::App& app, int& exit_code) {
   add_list(*bench, exit_code);
   add_draw(*bench, exit_code);
 }
+
+const RegisteredCommand registered_bench("bench", add_bench);
+
+}  // namespace
 
 }  // namespace hamelin::app

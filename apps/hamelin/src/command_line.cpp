@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "commands.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/text.hpp"
 #include "hamelin/integration/options.hpp"
@@ -113,6 +114,8 @@ std::string full_name(const CLI::App& command) {
 const CLI::App* find_command(const CLI::App& parent, const std::string& name) {
   for (const auto* command : shown_commands(parent))
     if (command->get_name() == name) return command;
+  if (const auto absence = absence_of(name); !absence.empty())
+    throw Error(ErrorCode::usage, absence);
   throw Error(ErrorCode::usage, unknown_argument_message(parent, name));
 }
 

@@ -1,33 +1,27 @@
 #pragma once
 #include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
 
-/// The subcommands: each function adds one. Its action runs after the command line is parsed and
-/// sets the exit code.
+/// The commands of the program. A command registers itself where it is defined, so that the program
+/// has those whose sources it is built from (HAMELIN_COMMANDS in apps/hamelin/CMakeLists.txt).
 namespace hamelin::app {
 
-void add_run(CLI::App& app, int& exit_code);
-void add_task(CLI::App& app, int& exit_code);
-void add_plan(CLI::App& app, int& exit_code);
-void add_optimize(CLI::App& app, int& exit_code);
-void add_integrate(CLI::App& app, int& exit_code);
-void add_accuracy(CLI::App& app, int& exit_code);
-void add_replay(CLI::App& app, int& exit_code);
-void add_explain(CLI::App& app, int& exit_code);
-void add_export(CLI::App& app, int& exit_code);
-void add_report(CLI::App& app, int& exit_code);
-void add_serve(CLI::App& app, int& exit_code);
-void add_plant(CLI::App& app, int& exit_code);
-void add_robot(CLI::App& app, int& exit_code);
-void add_scene(CLI::App& app, int& exit_code);
-void add_map(CLI::App& app, int& exit_code);
-void add_sweep(CLI::App& app, int& exit_code);
-void add_bench(CLI::App& app, int& exit_code);
-void add_plugins(CLI::App& app, int& exit_code);
-void add_validate(CLI::App& app, int& exit_code);
-void add_schema(CLI::App& app, int& exit_code);
-void add_help(CLI::App& app, int& exit_code);
-void add_completion(CLI::App& app, int& exit_code);
-/// Hidden from help: the build uses it to write the manual pages.
-void add_man(CLI::App& app, int& exit_code);
+/// Adds a command to the program. Its action runs after the command line is parsed and sets the
+/// exit code.
+using AddCommand = void (*)(CLI::App& app, int& exit_code);
+
+/// An object of this type with static storage duration registers a command.
+struct RegisteredCommand {
+  /// @param name  one of the names in commands.cpp, which also orders and groups them
+  RegisteredCommand(const char* name, AddCommand add);
+};
+
+/// Adds all registered commands, grouped and in the order of help. Those that this build lacks are
+/// added hidden, and refuse to run.
+void add_commands(CLI::App& app, int& exit_code);
+
+/// What refuses a command that this build lacks; empty for any other name.
+[[nodiscard]] std::string absence_of(const std::string& name);
 
 }  // namespace hamelin::app

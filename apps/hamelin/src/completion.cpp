@@ -148,8 +148,6 @@ std::string bash_script(const CLI::App& root) {
       beginning, cases.paths, cases.values, cases.options, cases.operands);
 }
 
-}  // namespace
-
 void add_completion(CLI::App& app, int& exit_code) {
   auto* completion = add_command(
       app, "completion", "Print a shell completion script for commands, options and file names",
@@ -164,5 +162,9 @@ void add_completion(CLI::App& app, int& exit_code) {
     exit_code = 0;
   });
 }
+
+const RegisteredCommand registered_completion("completion", add_completion);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -142,8 +142,6 @@ int explain(const ExplainCommand& command) {
   return 0;
 }
 
-}  // namespace
-
 void add_explain(CLI::App& app, int& exit_code) {
   auto* command = add_command(
       app, "explain",
@@ -170,5 +168,9 @@ void add_explain(CLI::App& app, int& exit_code) {
   command->add_flag("--json", options->json, "print JSON");
   command->callback([options, &exit_code] { exit_code = explain(*options); });
 }
+
+const RegisteredCommand registered_explain("explain", add_explain);
+
+}  // namespace
 
 }  // namespace hamelin::app

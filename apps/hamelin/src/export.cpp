@@ -76,8 +76,6 @@ int export_log(const ExportOptions& options) {
   return options.format == "mcap" ? export_mcap(options, target) : export_motion(options, target);
 }
 
-}  // namespace
-
 void add_export(CLI::App& app, int& exit_code) {
   auto* command =
       add_command(app, "export", "Write the motion in a log as CSV, ROS 2 JointTrajectory or MCAP",
@@ -104,5 +102,9 @@ void add_export(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   command->callback([options, &exit_code] { exit_code = export_log(*options); });
 }
+
+const RegisteredCommand registered_export("export", add_export);
+
+}  // namespace
 
 }  // namespace hamelin::app

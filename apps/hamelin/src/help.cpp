@@ -225,6 +225,8 @@ std::string HelpFormatter::make_help(const CLI::App* app, std::string, CLI::AppF
   return help_text(*app);
 }
 
+namespace {
+
 void add_help(CLI::App& app, int& exit_code) {
   auto* command = add_command(app, "help", "Print help on a command, or on the program",
                               "hamelin help run\n"
@@ -239,5 +241,9 @@ void add_help(CLI::App& app, int& exit_code) {
     exit_code = 0;
   });
 }
+
+const RegisteredCommand registered_help("help", add_help);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -47,8 +47,6 @@ int integrate(const IntegrateOptions& options) {
   });
 }
 
-}  // namespace
-
 void add_integrate(CLI::App& app, int& exit_code) {
   auto* command = add_command(
       app, "integrate",
@@ -77,5 +75,9 @@ void add_integrate(CLI::App& app, int& exit_code) {
   add_record_options(*command, options->record);
   command->callback([options, &exit_code] { exit_code = integrate(*options); });
 }
+
+const RegisteredCommand registered_integrate("integrate", add_integrate);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -15,25 +15,6 @@ namespace {
 
 using namespace hamelin::app;
 
-// A group of commands, in the order in which help shows them.
-struct CommandGroup {
-  const char* title;
-  std::vector<void (*)(CLI::App&, int&)> add;
-};
-
-const std::vector<CommandGroup>& command_groups() {
-  static const std::vector<CommandGroup> all{
-      {"Run",
-       {add_run, add_task, add_plan, add_optimize, add_integrate, add_accuracy, add_replay, add_sweep,
-        add_bench, add_serve, add_plant}},
-      {"Inspect", {add_report, add_explain, add_robot, add_scene, add_map, add_plugins}},
-      {"Files", {add_export, add_validate, add_schema}},
-      {"Help", {add_help, add_completion}},
-      {"", {add_man}},
-  };
-  return all;
-}
-
 void add_global_options(CLI::App& app) {
   app.set_help_flag("-h,--help", "print this help")->group(global_options);
   app.set_version_flag("--version", std::string(hamelin::version()), "print the version")
@@ -72,11 +53,7 @@ int run_command_line(int argc, char** argv) {
       "hamelin help run");
   add_global_options(app);
   app.require_subcommand(1);
-  for (const auto& group : command_groups())
-    for (const auto add : group.add) {
-      add(app, exit_code);
-      app.get_subcommands({}).back()->group(group.title);
-    }
+  add_commands(app, exit_code);
   if (argc == 1) {
     fmt::print("{}", overview_text(app));
     return 0;

@@ -78,8 +78,6 @@ void write_pages(const CLI::App& command, const std::filesystem::path& directory
   for (const auto* sub : shown_commands(command)) write_pages(*sub, directory);
 }
 
-}  // namespace
-
 void add_man(CLI::App& app, int& exit_code) {
   auto* command = add_command(app, "man", "Write the manual pages of all commands",
                               "hamelin man share/man/man1");
@@ -96,5 +94,9 @@ void add_man(CLI::App& app, int& exit_code) {
     exit_code = 0;
   });
 }
+
+const RegisteredCommand registered_man("man", add_man);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -131,8 +131,6 @@ void add_from_points(CLI::App& map) {
   command->callback([options] { from_points(*options); });
 }
 
-}  // namespace
-
 void add_map(CLI::App& app, int&) {
   auto* map = add_command(app, "map", "Make maps of what sensors saw",
                           "hamelin map from-points scan.ply --origin 0.2,0,0.9 -o cell.bt\n"
@@ -140,5 +138,9 @@ void add_map(CLI::App& app, int&) {
   map->require_subcommand(1);
   add_from_points(*map);
 }
+
+const RegisteredCommand registered_map("map", add_map);
+
+}  // namespace
 
 }  // namespace hamelin::app

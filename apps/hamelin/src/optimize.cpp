@@ -95,8 +95,6 @@ int optimize(OptimizeOptions options) {
   return motion.valid() ? 0 : 1;
 }
 
-}  // namespace
-
 void add_optimize(CLI::App& app, int& exit_code) {
   auto* command = add_command(
       app, "optimize",
@@ -175,5 +173,9 @@ void add_optimize(CLI::App& app, int& exit_code) {
   command->add_flag("--json", options->json, "print JSON");
   command->callback([options, &exit_code] { exit_code = optimize(*options); });
 }
+
+const RegisteredCommand registered_optimize("optimize", add_optimize);
+
+}  // namespace
 
 }  // namespace hamelin::app

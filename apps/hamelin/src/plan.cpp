@@ -79,8 +79,6 @@ int plan(PlanOptions options) {
   return plan.found() ? 0 : 1;
 }
 
-}  // namespace
-
 void add_plan(CLI::App& app, int& exit_code) {
   auto* command =
       add_command(app, "plan",
@@ -118,5 +116,9 @@ void add_plan(CLI::App& app, int& exit_code) {
   command->add_flag("--json", options->json, "print JSON");
   command->callback([options, &exit_code] { exit_code = plan(*options); });
 }
+
+const RegisteredCommand registered_plan("plan", add_plan);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -97,8 +97,6 @@ int check(const CheckOptions& options) {
   return failed ? 1 : 0;
 }
 
-}  // namespace
-
 void add_plugins(CLI::App& app, int& exit_code) {
   auto* plugins = add_command(app, "plugins", "List and check planner plugins",
                               "hamelin plugins list\n"
@@ -153,5 +151,9 @@ void add_plugins(CLI::App& app, int& exit_code) {
   check_command->add_flag("--json", check_options->json, "print JSON");
   check_command->callback([check_options, &exit_code] { exit_code = check(*check_options); });
 }
+
+const RegisteredCommand registered_plugins("plugins", add_plugins);
+
+}  // namespace
 
 }  // namespace hamelin::app

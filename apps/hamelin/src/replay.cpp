@@ -146,8 +146,6 @@ int replay(const ReplayOptions& options) {
   });
 }
 
-}  // namespace
-
 void add_replay(CLI::App& app, int& exit_code) {
   auto* command = add_command(
       app, "replay", "Repeat the run that a log records, or verify the log by repeating it",
@@ -173,5 +171,9 @@ void add_replay(CLI::App& app, int& exit_code) {
   add_record_options(*command, options->record);
   command->callback([options, &exit_code] { exit_code = replay(*options); });
 }
+
+const RegisteredCommand registered_replay("replay", add_replay);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -83,8 +83,6 @@ int make_report(const ReportOptions& options) {
   return 0;
 }
 
-}  // namespace
-
 void add_report(CLI::App& app, int& exit_code) {
   auto* command =
       add_command(app, "report",
@@ -111,5 +109,9 @@ void add_report(CLI::App& app, int& exit_code) {
   command->add_flag("--json", options->json, "print a summary of the page as JSON");
   command->callback([options, &exit_code] { exit_code = make_report(*options); });
 }
+
+const RegisteredCommand registered_report("report", add_report);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -109,8 +109,6 @@ void make_chain(const ChainFlags& flags) {
     report(fmt::format("{}: {} joints\n", flags.output.string(), robot.dof()));
 }
 
-}  // namespace
-
 void add_robot(CLI::App& app, int& exit_code) {
   auto* robot = add_command(app, "robot", "Inspect, check, identify and make robots",
                             "hamelin robot fit arm.urdf -o arm.spheres.json\n"
@@ -181,5 +179,9 @@ void add_robot(CLI::App& app, int& exit_code) {
     exit_code = 0;
   });
 }
+
+const RegisteredCommand registered_robot("robot", add_robot);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -67,8 +67,6 @@ int run(const RunOptions& options) {
   });
 }
 
-}  // namespace
-
 void add_run(CLI::App& app, int& exit_code) {
   auto* command =
       add_command(app, "run", "Move the arm of a scene to its goals with a planner, in closed loop",
@@ -120,5 +118,9 @@ void add_run(CLI::App& app, int& exit_code) {
   add_record_options(*command, options->record);
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }
+
+const RegisteredCommand registered_run("run", add_run);
+
+}  // namespace
 
 }  // namespace hamelin::app

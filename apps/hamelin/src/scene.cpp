@@ -433,8 +433,6 @@ void add_scene_make(CLI::App& scene) {
   make_command->callback([options] { make(*options); });
 }
 
-}  // namespace
-
 void add_scene(CLI::App& app, int&) {
   auto* scene =
       add_command(app, "scene", "Inspect, crop and make scenes and maps",
@@ -447,5 +445,9 @@ void add_scene(CLI::App& app, int&) {
   add_scene_crop(*scene);
   add_scene_make(*scene);
 }
+
+const RegisteredCommand registered_scene("scene", add_scene);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -24,8 +24,6 @@ void print_schema(const std::string& name, bool json) {
     fmt::print("{}\n", fmt::join(names, "\n"));
 }
 
-}  // namespace
-
 void add_schema(CLI::App& app, int& exit_code) {
   auto* schema = add_command(app, "schema", "Print the JSON Schemas of the file formats",
                              "hamelin schema print\n"
@@ -45,5 +43,9 @@ void add_schema(CLI::App& app, int& exit_code) {
     exit_code = 0;
   });
 }
+
+const RegisteredCommand registered_schema("schema", add_schema);
+
+}  // namespace
 
 }  // namespace hamelin::app

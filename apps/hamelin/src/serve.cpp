@@ -145,8 +145,6 @@ void add_share(CLI::App& command, const char* name, double& value, const char* h
   command.add_option(name, value, help)->type_name("SHARE")->check(CLI::Range(0.0, 1.0));
 }
 
-}  // namespace
-
 void add_serve(CLI::App& app, int& exit_code) {
   auto* command = add_command(
       app, "serve", "Run the control loop of a scene as a process, for the driver of an arm",
@@ -220,5 +218,10 @@ void add_plant(CLI::App& app, int& exit_code) {
       ->type_name("OUT.json");
   command->callback([options, &exit_code] { exit_code = move_plant(*options); });
 }
+
+const RegisteredCommand registered_serve("serve", add_serve);
+const RegisteredCommand registered_plant("plant", add_plant);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -5,6 +5,8 @@
 
 namespace hamelin::app {
 
+namespace {
+
 void add_sweep(CLI::App& app, int& exit_code) {
   auto* sweep = add_command(
       app, "sweep", "Plan and run many scenes, and summarise the results",
@@ -22,5 +24,9 @@ void add_sweep(CLI::App& app, int& exit_code) {
   add_sweep_pairs(*sweep, exit_code);
   add_sweep_one(*sweep, exit_code);
 }
+
+const RegisteredCommand registered_sweep("sweep", add_sweep);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -65,8 +65,6 @@ int task(const TaskOptions& options) {
   });
 }
 
-}  // namespace
-
 void add_task(CLI::App& app, int& exit_code) {
   auto* command =
       add_command(app, "task",
@@ -99,5 +97,9 @@ void add_task(CLI::App& app, int& exit_code) {
   add_record_options(*command, options->record);
   command->callback([options, &exit_code] { exit_code = task(*options); });
 }
+
+const RegisteredCommand registered_task("task", add_task);
+
+}  // namespace
 
 }  // namespace hamelin::app

@@ -171,8 +171,6 @@ int validate(const ValidateOptions& options) {
   return code;
 }
 
-}  // namespace
-
 void add_validate(CLI::App& app, int& exit_code) {
   auto* command = add_command(app, "validate",
                               "Check files of all formats, from robots to results. "
@@ -189,5 +187,9 @@ void add_validate(CLI::App& app, int& exit_code) {
   command->add_flag("--json", options->json, "print JSON, one entry per file");
   command->callback([options, &exit_code] { exit_code = validate(*options); });
 }
+
+const RegisteredCommand registered_validate("validate", add_validate);
+
+}  // namespace
 
 }  // namespace hamelin::app

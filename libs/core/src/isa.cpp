@@ -19,6 +19,25 @@ constexpr std::array<std::string_view, 1> names{"generic"};
 constexpr std::int32_t none = -1;
 std::atomic<std::int32_t> chosen{none};
 
+// What a build lacks is chosen by HAMELIN_INSTRUCTION_SETS.
+#ifdef HAMELIN_WITHOUT_BASELINE
+constexpr bool has_baseline = false;
+#else
+constexpr bool has_baseline = true;
+#endif
+#if defined(__x86_64__)
+#ifdef HAMELIN_WITHOUT_V3
+constexpr bool has_v3 = false;
+#else
+constexpr bool has_v3 = true;
+#endif
+#ifdef HAMELIN_WITHOUT_V4
+constexpr bool has_v4 = false;
+#else
+constexpr bool has_v4 = true;
+#endif
+#endif
+
 Isa best_isa() noexcept {
   Isa isa = Isa::baseline;
   for (std::size_t i = 0; i < names.size(); ++i)
@@ -32,12 +51,12 @@ bool is_available([[maybe_unused]] Isa isa) noexcept {
 #if defined(__x86_64__)
   __builtin_cpu_init();
   const bool v3 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  if (isa == Isa::v3) return v3;
+  if (isa == Isa::v3) return has_v3 && v3;
   if (isa == Isa::v4)
-    return v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+    return has_v4 && v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
            __builtin_cpu_supports("avx512dq");
 #endif
-  return isa == Isa::baseline;
+  return has_baseline && isa == Isa::baseline;
 }
 
 Isa default_isa() noexcept {
@@ -67,7 +86,8 @@ Isa isa_from_name(std::string_view name, std::string_view where) {
     const Isa isa{static_cast<std::int32_t>(i)};
     if (is_available(isa)) return isa;
     throw Error(ErrorCode::usage,
-                formatted("{}: this machine does not have the instruction set '{}', expected {}",
+                formatted("{}: this machine or this build does not have the instruction set '{}', "
+                          "expected {}",
                           where, name, name_of(best_isa())));
   }
   throw Error(ErrorCode::usage,
@@ -78,7 +98,8 @@ Isa isa_from_name(std::string_view name, std::string_view where) {
 void require_available(Isa isa) {
   if (!is_available(isa))
     throw Error(ErrorCode::usage,
-                formatted("instruction set: this machine does not have '{}', expected at most '{}'",
+                formatted("instruction set: this machine or this build does not have '{}', "
+                          "expected '{}'",
                           name_of(isa), name_of(best_isa())));
 }
 

@@ -226,6 +226,20 @@ TEST_CASE("the coefficients keep full precision on both sides of their threshold
   }
 }
 
+TEST_CASE("the rotation between two directions is the least one, opposite ones included",
+          "[geometry][unit]") {
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  for (const double angle : {0.0, 1e-9, 0.3, 1.5, 3.0, std::numbers::pi - 1e-5, std::numbers::pi}) {
+    CAPTURE(angle);
+    const Eigen::Vector3d to(2.0 * std::sin(angle), 0.0, 2.0 * std::cos(angle));
+    const Eigen::Matrix3d R = rotation_between(3.0 * z, to);
+    CHECK(gap(R * z, to.normalized()) < 1e-9);
+    CHECK(gap(R * R.transpose(), Eigen::Matrix3d::Identity()) < 1e-9);
+    CHECK(R.determinant() > 0.0);
+    CHECK(SO3(R).log().norm() == Approx(angle).margin(1e-9));
+  }
+}
+
 TEST_CASE("quaternions and rotation matrices agree, and a quaternion must be unit",
           "[geometry][unit]") {
   const Eigen::Vector4d q = Eigen::Vector4d(0.5, -0.5, 0.5, 0.5);

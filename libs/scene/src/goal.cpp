@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/geometry/so3.hpp"
 
 namespace hamelin::scene {
 
@@ -70,7 +71,7 @@ geometry::SE3 nearest_pose(const Goal& goal, const geometry::SE3& tip) {
   const Eigen::Vector3d p = goal.pose.p() + R * at.cwiseMax(goal.low_m).cwiseMin(goal.high_m);
   if (!goal.free_axis) return {R, p};
   const Eigen::Vector3d now = tip.R() * *goal.free_axis, wanted = R * *goal.free_axis;
-  return {Eigen::Quaterniond::FromTwoVectors(now, wanted).toRotationMatrix() * tip.R(), p};
+  return {geometry::rotation_between(now, wanted) * tip.R(), p};
 }
 
 namespace {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hamelin/geometry/so3.hpp"
 #include "tip_rule.hpp"
 
 namespace hamelin::search {
@@ -12,7 +13,7 @@ using Eigen::Vector3d;
 namespace {
 
 Matrix3d frame_along(const Vector3d& direction) {
-  return Eigen::Quaterniond::FromTwoVectors(direction, Vector3d::UnitZ()).toRotationMatrix();
+  return geometry::rotation_between(direction, Vector3d::UnitZ());
 }
 
 double angle_of(const Vector3d& value) {

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/geometry/so3.hpp"
 #include "hamelin/sensing/map_grid.hpp"
 #include "ray.hpp"
 
@@ -127,8 +128,7 @@ void add_solids(const scene::Shapes& arm, std::vector<DepthRenderer::Solid>& sol
     const Vector3d half = arm.half_axes[i];
     solid.shape.shape = scene::Shape::capsule;
     solid.shape.length_m = 2.0 * half.norm();
-    solid.pose = {Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), half).toRotationMatrix(),
-                  arm.centers[i]};
+    solid.pose = {geometry::rotation_between(Vector3d::UnitZ(), half), arm.centers[i]};
   }
 }
 
