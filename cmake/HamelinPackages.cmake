@@ -51,11 +51,8 @@ endfunction()
 # Sets `out` to the development packages that a program needs which links the static libraries.
 function(hamelin_debian_development_packages out)
   set(debian_Eigen3 libeigen3-dev)
-  set(debian_LibArchive libarchive-dev)
-  set(debian_MuJoCo libmujoco-dev)
   set(debian_OpenSSL libssl-dev)
   set(debian_ZLIB zlib1g-dev)
-  set(debian_assimp libassimp-dev)
   set(debian_fmt libfmt-dev)
   set(debian_nlohmann_json nlohmann-json3-dev)
   set(debian_octomap liboctomap-dev)
@@ -73,11 +70,24 @@ function(hamelin_debian_development_packages out)
       list(APPEND names ${debian_${package}})
     endforeach()
   endforeach()
-  if(HAMELIN_IPOPT_FOUND)
-    list(APPEND names coinor-libipopt-dev)
-  endif()
   list(REMOVE_DUPLICATES names)
   list(SORT names)
+  set(${out} ${names} PARENT_SCOPE)
+endfunction()
+
+# Sets `out` to the packages of the libraries that are loaded when they are needed, which dpkg-shlibdeps cannot know.
+function(hamelin_debian_loaded_packages out)
+  set(names "")
+  get_property(libraries GLOBAL PROPERTY HAMELIN_LOADED_LIBRARIES)
+  foreach(library IN LISTS libraries)
+    file(REAL_PATH "${library}" file)
+    execute_process(COMMAND dpkg -S "${file}" OUTPUT_VARIABLE owner ERROR_QUIET)
+    if(NOT owner MATCHES "^([^:]+):")
+      message(FATAL_ERROR "${file}: belongs to no package, expected one that hamelin can depend on")
+    endif()
+    list(APPEND names ${CMAKE_MATCH_1})
+  endforeach()
+  list(REMOVE_DUPLICATES names)
   set(${out} ${names} PARENT_SCOPE)
 endfunction()
 
@@ -111,7 +121,8 @@ are built against it; a template and examples are included.")
 
 This package has its planners as plugins: hybrid, which is the one to use,
 mppi, which samples motions, the potential field apf, gyro, and a template.")
-  hamelin_debian_package(hamelin SECTION science SIBLINGS hamelin-plugins SUGGESTS python3-hamelin hamelin-doc
+  hamelin_debian_loaded_packages(loaded)
+  hamelin_debian_package(hamelin SECTION science SIBLINGS hamelin-plugins DEPENDS ${loaded} SUGGESTS python3-hamelin hamelin-doc
     SUMMARY "motions of robot arms in 3D maps, simulated and proved clear"
     DESCRIPTION "hamelin moves robot arms through cluttered 3D maps without touching anything,
 and simulates them with integrators whose errors are measured.
@@ -125,7 +136,7 @@ motions, and sweeps over many scenes in parallel.")
     string(REGEX MATCH "3[.]([0-9]+)" python "${python}")
     math(EXPR next "${CMAKE_MATCH_1} + 1")
     hamelin_debian_package(python3-hamelin SECTION python SIBLINGS hamelin hamelin-plugins
-      DEPENDS "python3 (>= ${python})" "python3 (<< 3.${next})" "python3-numpy (>= 1:1.21)" libpython${python}
+      DEPENDS "python3 (>= ${python})" "python3 (<< 3.${next})" "python3-numpy (>= 1:1.21)" libpython${python} ${loaded}
       RECOMMENDS python3-pandas python3-matplotlib SUGGESTS hamelin-doc
       CONTROL "${folder}/postinst" "${folder}/prerm"
       SUMMARY "motions of robot arms in 3D maps, for Python"

@@ -102,6 +102,20 @@ function(hamelin_library)
   hamelin_benchmarks(NAME ${arg_NAME} LINKS hamelin::${arg_NAME})
 endfunction()
 
+# hamelin_load_when_needed(TARGET NAME LIBRARY HEADERS ...): the sources of TARGET see the HEADERS of a shared library that
+# they load themselves, by core's SharedLibrary, from the file name in the definition HAMELIN_<NAME>_FILE. A program that
+# never needs the library then starts without it.
+function(hamelin_load_when_needed target name library)
+  cmake_parse_arguments(PARSE_ARGV 3 arg "" "" "HEADERS")
+  execute_process(COMMAND "${CMAKE_READELF}" -d "${library}" OUTPUT_VARIABLE dynamic ERROR_QUIET)
+  if(NOT dynamic MATCHES "SONAME[^[]*[[]([^]]+)[]]")
+    message(FATAL_ERROR "${library}: has no SONAME, expected a shared library")
+  endif()
+  target_compile_definitions(${target} PRIVATE HAMELIN_${name}_FILE="${CMAKE_MATCH_1}")
+  target_include_directories(${target} SYSTEM PRIVATE ${arg_HEADERS})
+  set_property(GLOBAL APPEND PROPERTY HAMELIN_LOADED_LIBRARIES "${library}")
+endfunction()
+
 # Additional compiler options of kernels; a source's own options come last. Kernels are optimised in
 # every build, so that all calls are inlined, but less with sanitizers, whose checks multiply the
 # code. With its defaults, GCC would copy value types with many lanes through memory, and vectorise
@@ -248,7 +262,7 @@ function(hamelin_install_package)
   write_basic_package_version_file(hamelinConfigVersion.cmake COMPATIBILITY SameMinorVersion)
   install(FILES "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfig.cmake"
     "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfigVersion.cmake"
-    "${PROJECT_SOURCE_DIR}/cmake/HamelinPlugin.cmake" "${PROJECT_SOURCE_DIR}/cmake/FindMuJoCo.cmake"
+    "${PROJECT_SOURCE_DIR}/cmake/HamelinPlugin.cmake"
     DESTINATION ${dest} COMPONENT libhamelin-dev)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/data/" "${PROJECT_SOURCE_DIR}/docs/schema"
     DESTINATION "${CMAKE_INSTALL_DATADIR}/hamelin" COMPONENT hamelin)

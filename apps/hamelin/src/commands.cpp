@@ -67,7 +67,8 @@ std::string absence_of(const std::string& name) {
   });
   if (!known || registered().contains(name)) return {};
   return fmt::format(
-      "{}: is not part of this build; `./dev build demo` in the checkout builds all commands", name);
+      "{}: is not part of this build; `./dev build demo` in the checkout builds all commands",
+      name);
 }
 
 }  // namespace hamelin::app

@@ -19,19 +19,19 @@ namespace {
 struct OptimizeOptions {
   std::filesystem::path file;
   SceneFlags flags;
-  std::string minimize = "effort", solver = "banded", format = "json";
+  std::string minimize = "effort", format = "json";
   optimal::SceneMotionOptions motion;
   std::optional<double> rate_hz;
   std::optional<std::filesystem::path> output;
   bool json = false;
 };
 
-std::string goal_text(const optimal::GoalMotion& goal, std::size_t index, bool exact) {
+std::string goal_text(const optimal::GoalMotion& goal, std::size_t index) {
   const optimal::Optimized& f = goal.found;
   const optimal::Solution& s = f.solution;
   const std::string name = fmt::format("goal {}", index + 1);
   const bool optimal = goal.valid() && s.converged;
-  const std::string state = optimal        ? exact ? "optimal" : "nearly optimal"
+  const std::string state = optimal        ? "nearly optimal"
                             : goal.valid() ? "valid, not proved optimal"
                                            : "no motion";
   std::string text = fmt::format("{:<12}{} after {} iterations: {:.6g} s, cost {:.6g}\n", name,
@@ -76,8 +76,6 @@ std::string file_text(const OptimizeOptions& options, const optimal::SceneMotion
 int optimize(OptimizeOptions options) {
   options.motion.objective =
       options.minimize == "time" ? optimal::Objective::time : optimal::Objective::effort;
-  options.motion.solve.solver =
-      options.solver == "ipopt" ? optimal::Solver::ipopt : optimal::Solver::banded;
   const scene::Scene scene = read_scene(options.file, options.flags);
   std::optional<std::filesystem::path> target;
   if (options.output) target = output_target(*options.output, files_of(scene));
@@ -87,9 +85,7 @@ int optimize(OptimizeOptions options) {
     print_json(optimal::to_json(motion, options.motion, options.rate_hz));
   } else {
     std::string text;
-    const bool exact = options.motion.solve.solver == optimal::Solver::ipopt;
-    for (std::size_t i = 0; i < motion.goals.size(); ++i)
-      text += goal_text(motion.goals[i], i, exact);
+    for (std::size_t i = 0; i < motion.goals.size(); ++i) text += goal_text(motion.goals[i], i);
     report(text);
   }
   return motion.valid() ? 0 : 1;
@@ -150,11 +146,6 @@ void add_optimize(CLI::App& app, int& exit_code) {
       ->add_option("--jerk", motion.jerk, "limit of all joints [rad/s^3 or m/s^3] (default: none)")
       ->type_name("J")
       ->check(positive);
-  restrict_values(command
-                      ->add_option("--solver", options->solver,
-                                   "banded: hamelin's own; or ipopt, where this build has it")
-                      ->capture_default_str(),
-                  {"banded", "ipopt"});
   add_set_option(*command, options->flags.set,
                  "set one value of the scene, e.g. /model/torque_limits=false; may be repeated");
   restrict_values(command

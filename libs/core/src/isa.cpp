@@ -53,8 +53,8 @@ bool is_available([[maybe_unused]] Isa isa) noexcept {
   const bool v3 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
   if (isa == Isa::v3) return has_v3 && v3;
   if (isa == Isa::v4)
-    return has_v4 && v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-           __builtin_cpu_supports("avx512dq");
+    return has_v4 && v3 && __builtin_cpu_supports("avx512f") &&
+           __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq");
 #endif
   return has_baseline && isa == Isa::baseline;
 }

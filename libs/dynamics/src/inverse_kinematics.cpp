@@ -1,6 +1,5 @@
 #include "hamelin/dynamics/inverse_kinematics.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
@@ -118,9 +117,8 @@ bool InverseKinematics::solve(const TipTarget& target, Eigen::VectorXd& q) {
       return true;
     frame_jacobian(model_, ws_, model_.robot().tip.link, tip.p(), J_);
     J_.topRows<3>() *= target.turns ? rotation_length : 0.0;
-    Eigen::Matrix<double, 6, 6> G = J_ * J_.transpose();
-    G.diagonal().array() += root_damping;
-    step_.noalias() = J_.transpose() * G.llt().solve(error).eval();
+    inverse_.factor(J_, root_damping);
+    inverse_.apply(error, step_);
     const double largest = step_.lpNorm<Eigen::Infinity>();
     if (largest > largest_step) step_ *= largest_step / largest;
     q = (q + step_).cwiseMax(box_.lower).cwiseMin(box_.upper);

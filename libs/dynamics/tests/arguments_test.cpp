@@ -369,6 +369,7 @@ TEST_CASE("blocks of states with one row stride are used in place",
 TEST_CASE("the instruction set is an argument", "[dynamics][unit][isa]") {
   const Model model(test::random_robot(5, n));
   CHECK_THROWS_WITH(Workspace(model, Isa{7}), Contains("this machine or this build does not have"));
-  CHECK_THROWS_WITH(BatchWorkspace(model, Isa{7}), Contains("this machine or this build does not have"));
+  CHECK_THROWS_WITH(BatchWorkspace(model, Isa{7}),
+                    Contains("this machine or this build does not have"));
   CHECK_NOTHROW(Workspace(model, Isa::baseline));
 }

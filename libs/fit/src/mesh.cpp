@@ -1,17 +1,19 @@
 #include "hamelin/fit/mesh.hpp"
 
+#include <assimp/cimport.h>
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <assimp/Importer.hpp>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <string>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/shared_library.hpp"
 
 namespace hamelin::fit {
 
@@ -20,6 +22,37 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::uintmax_t file_bytes_max = 1ULL << 30;
+
+// The functions of assimp that are used; it is loaded for the first mesh.
+struct Assimp {
+  SharedLibrary library{HAMELIN_ASSIMP_FILE, "reading a mesh"};
+  HAMELIN_LOADED(library, aiCreatePropertyStore);
+  HAMELIN_LOADED(library, aiSetImportPropertyInteger);
+  HAMELIN_LOADED(library, aiReleasePropertyStore);
+  HAMELIN_LOADED(library, aiImportFileExWithProperties);
+  HAMELIN_LOADED(library, aiGetErrorString);
+  HAMELIN_LOADED(library, aiReleaseImport);
+};
+
+const Assimp& assimp() {
+  static const Assimp functions;
+  return functions;
+}
+
+using ScenePointer = std::unique_ptr<const aiScene, decltype(&aiReleaseImport)>;
+
+// Null if the file cannot be read.
+ScenePointer import_scene(const std::filesystem::path& file) {
+  const Assimp& with = assimp();
+  const std::unique_ptr<aiPropertyStore, decltype(&aiReleasePropertyStore)> options(
+      with.aiCreatePropertyStore(), with.aiReleasePropertyStore);
+  // ROS tools do not rotate COLLADA meshes to the file's up-axis.
+  with.aiSetImportPropertyInteger(options.get(), AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, 1);
+  return {with.aiImportFileExWithProperties(file.c_str(),
+                                            aiProcess_Triangulate | aiProcess_PreTransformVertices,
+                                            nullptr, options.get()),
+          with.aiReleaseImport};
+}
 
 [[noreturn]] void fail(ErrorCode code, const std::filesystem::path& file, std::string message) {
   std::replace_if(
@@ -48,18 +81,9 @@ Mesh load_mesh(const std::filesystem::path& file, const Vector3d& scale) {
   if (bytes > file_bytes_max)
     fail(ErrorCode::invalid, file,
          fmt::format("has {} bytes, expected a mesh of at most {}", bytes, file_bytes_max));
-  Assimp::Importer importer;
-  // ROS tools do not rotate COLLADA meshes to the file's up-axis.
-  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
-  const aiScene* scene = nullptr;
-  try {
-    scene =
-        importer.ReadFile(file.string(), aiProcess_Triangulate | aiProcess_PreTransformVertices);
-  } catch (const std::exception& e) {
-    fail(ErrorCode::parse, file, fmt::format("not a mesh: {}", e.what()));
-  }
+  const ScenePointer scene = import_scene(file);
   if (scene == nullptr)
-    fail(ErrorCode::parse, file, fmt::format("not a mesh: {}", importer.GetErrorString()));
+    fail(ErrorCode::parse, file, fmt::format("not a mesh: {}", assimp().aiGetErrorString()));
   Mesh mesh;
   for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
     const aiMesh& part = *scene->mMeshes[m];

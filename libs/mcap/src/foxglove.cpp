@@ -90,7 +90,8 @@ void Entity::add_capsule(const Vector3d& a, const Vector3d& b, double radius, co
   add_sphere(a, radius, color);
   add_sphere(b, radius, color);
   if (axis.norm() == 0.0) return;
-  add_cylinder({geometry::rotation_between(Vector3d::UnitZ(), axis), 0.5 * (a + b)}, radius, axis.norm(), color);
+  add_cylinder({geometry::rotation_between(Vector3d::UnitZ(), axis), 0.5 * (a + b)}, radius,
+               axis.norm(), color);
 }
 
 void Entity::add_axes(const geometry::SE3& pose, double length) {

@@ -18,15 +18,15 @@ constexpr const char* file_name = "model.xml";
 class MemoryFile {
  public:
   explicit MemoryFile(const std::string& content) {
-    mj_defaultVFS(files_.get());
+    api().mj_defaultVFS(files_.get());
     const bool made =
-        mj_makeEmptyFileVFS(files_.get(), file_name, static_cast<int>(content.size())) == 0;
+        api().mj_makeEmptyFileVFS(files_.get(), file_name, static_cast<int>(content.size())) == 0;
     if (!made) throw Error(ErrorCode::io, "MuJoCo: cannot keep a model in memory");
     std::memcpy(files_->filedata[0], content.data(), content.size());
   }
   MemoryFile(const MemoryFile&) = delete;
   MemoryFile& operator=(const MemoryFile&) = delete;
-  ~MemoryFile() { mj_deleteVFS(files_.get()); }
+  ~MemoryFile() { api().mj_deleteVFS(files_.get()); }
   [[nodiscard]] const mjVFS* get() const noexcept { return files_.get(); }
 
  private:
@@ -36,13 +36,18 @@ class MemoryFile {
 // By default MuJoCo waits for a key and exits on an error, and writes warnings to a file in the
 // working directory. Warnings are read from mjData instead.
 void set_handlers() {
-  mju_user_error = [](const char* text) {
+  *api().mju_user_error = [](const char* text) {
     throw Error(ErrorCode::invalid, fmt::format("MuJoCo: {}", text));
   };
-  mju_user_warning = [](const char*) {};
+  *api().mju_user_warning = [](const char*) {};
 }
 
 }  // namespace
+
+const Api& api() {
+  static const Api functions;
+  return functions;
+}
 
 ModelPointer load_model(const std::string& mjcf, const std::string& where) {
   static std::mutex one_at_a_time;  // the reader keeps the last model that it read
@@ -51,8 +56,8 @@ ModelPointer load_model(const std::string& mjcf, const std::string& where) {
   const MemoryFile file(mjcf);
   std::array<char, 1000> error{};
   ModelPointer model(
-      mj_loadXML(file_name, file.get(), error.data(), static_cast<int>(error.size())));
-  mj_freeLastXML();
+      api().mj_loadXML(file_name, file.get(), error.data(), static_cast<int>(error.size())));
+  api().mj_freeLastXML();
   if (model) return model;
   std::string reason(error.data());
   for (char& c : reason)

@@ -54,8 +54,8 @@ void NearBoxes::place(const scene::BoxField& field, mjModel& model, int map_body
   for (const int k : chosen_) {
     const scene::Box& box = field.boxes()[static_cast<std::size_t>(k)];
     const Vector3d center = 0.5 * (box.lo + box.hi), half = 0.5 * (box.hi - box.lo);
-    mju_copy3(vector_of(model.geom_pos, geom), center.data());
-    mju_copy3(vector_of(model.geom_size, geom), half.data());
+    std::copy_n(center.data(), 3, vector_of(model.geom_pos, geom));
+    std::copy_n(half.data(), 3, vector_of(model.geom_size, geom));
     model.geom_rbound[geom] = half.norm();
     ++geom;
   }

@@ -36,7 +36,7 @@ class MujocoPlant final : public simulation::Plant {
       : setup_(setup),
         description_{"mujoco",
                      "MuJoCo",
-                     mj_versionString(),
+                     api().mj_versionString(),
                      "mujoco-euler",
                      "improvement of the constraint solver",
                      0.0,
@@ -60,9 +60,9 @@ class MujocoPlant final : public simulation::Plant {
 
   [[nodiscard]] bool step(const VectorXd& torque, double step_s) override {
     model_->opt.timestep = step_s;
-    mju_copy(data_->qfrc_applied, torque.data(), model_->nv);
+    std::copy_n(torque.data(), model_->nv, data_->qfrc_applied);
     if (!wrenches_.empty()) apply_wrenches();
-    mj_step2(model_.get(), data_.get());
+    api().mj_step2(model_.get(), data_.get());
     report_ = {};
     report_.step_s = step_s;
     report_.evaluations = 1;
@@ -72,8 +72,8 @@ class MujocoPlant final : public simulation::Plant {
     book_work(torque);
     ++node_.k;
     node_.time_s = static_cast<double>(node_.k) * step_s;
-    mju_copy(node_.q.data(), data_->qpos, model_->nq);
-    mju_copy(node_.v.data(), data_->qvel, model_->nv);
+    std::copy_n(data_->qpos, model_->nq, node_.q.data());
+    std::copy_n(data_->qvel, model_->nv, node_.v.data());
     arrive(!environment_.advance(node_.time_s).empty());
     return report_.converged = accepted();
   }
@@ -161,15 +161,15 @@ class MujocoPlant final : public simulation::Plant {
     map_boxes_ = map_boxes;
     model_ = load_model(mjcf(setup_, environment_, self_ ? &*self_ : nullptr, map_boxes),
                         setup_.scene.name);
-    data_.reset(mj_makeData(model_.get()));
+    data_.reset(api().mj_makeData(model_.get()));
     const auto& links = setup_.model.robot().links;
     for (int i = 0; i < setup_.model.dof(); ++i) {
       const model::Link& link = links[static_cast<std::size_t>(i)];
-      const int body = mj_name2id(model_.get(), mjOBJ_BODY, link_name(i).c_str());
+      const int body = api().mj_name2id(model_.get(), mjOBJ_BODY, link_name(i).c_str());
       model_->body_mass[body] = link.mass_kg;
-      mju_copy3(vector_of(model_->body_inertia, body), principal_inertia(link).moments.data());
+      std::copy_n(principal_inertia(link).moments.data(), 3, vector_of(model_->body_inertia, body));
     }
-    mj_setConst(model_.get(), data_.get());
+    api().mj_setConst(model_.get(), data_.get());
     find_obstacles();
     std::vector<int> shapes;
     for (int geom = 0; geom < model_->ngeom; ++geom)
@@ -183,8 +183,10 @@ class MujocoPlant final : public simulation::Plant {
     for (std::size_t k = 0; k < obstacles.size(); ++k) {
       const scene::Obstacle& obstacle = obstacles[k];
       const int index = static_cast<int>(k);
-      const int geom = mj_name2id(model_.get(), mjOBJ_GEOM, name_of(Kind::obstacle, index).c_str()),
-                body = mj_name2id(model_.get(), mjOBJ_BODY, obstacle_body_name(index).c_str());
+      const int geom = api().mj_name2id(model_.get(), mjOBJ_GEOM,
+                                        name_of(Kind::obstacle, index).c_str()),
+                body =
+                    api().mj_name2id(model_.get(), mjOBJ_BODY, obstacle_body_name(index).c_str());
       if (obstacle.shape != scene::Shape::frame &&
           (environment_.moves(k) || obstacle.appears_s > 0.0))
         obstacles_.push_back({&obstacle, geom, model_->body_mocapid[body]});
@@ -192,9 +194,9 @@ class MujocoPlant final : public simulation::Plant {
   }
 
   void put_state() {
-    mj_resetData(model_.get(), data_.get());
-    mju_copy(data_->qpos, node_.q.data(), model_->nq);
-    mju_copy(data_->qvel, node_.v.data(), model_->nv);
+    api().mj_resetData(model_.get(), data_.get());
+    std::copy_n(node_.q.data(), model_->nq, data_->qpos);
+    std::copy_n(node_.v.data(), model_->nv, data_->qvel);
   }
 
   // Finds contacts and constraints at the node, with the obstacles where they are now.
@@ -204,16 +206,16 @@ class MujocoPlant final : public simulation::Plant {
       model_->geom_conaffinity[o.geom] = scene::exists(*o.obstacle, node_.time_s) ? 1 : 0;
       if (o.mocap < 0) continue;
       const geometry::SE3 at = scene::motion_at(*o.obstacle, node_.time_s).pose;
-      mju_copy3(vector_of(data_->mocap_pos, o.mocap), at.p().data());
-      mju_copy4(data_->mocap_quat + 4 * o.mocap, geometry::quaternion_wxyz(at.R()).data());
+      std::copy_n(at.p().data(), 3, vector_of(data_->mocap_pos, o.mocap));
+      std::copy_n(geometry::quaternion_wxyz(at.R()).data(), 4, data_->mocap_quat + 4 * o.mocap);
     }
-    mj_step1(model_.get(), data_.get());
+    api().mj_step1(model_.get(), data_.get());
     if (environment_.map_field().empty()) return;
     const double moved = near_.moved_m(*data_);
     if (!other_map && moved < 0.5 * NearBoxes::slack_m) return;
     choose_boxes();
     // The boxes chosen before were not all that the arm may touch here.
-    if (other_map || moved > NearBoxes::slack_m) mj_step1(model_.get(), data_.get());
+    if (other_map || moved > NearBoxes::slack_m) api().mj_step1(model_.get(), data_.get());
   }
 
   void choose_boxes() {
@@ -223,10 +225,10 @@ class MujocoPlant final : public simulation::Plant {
       const std::vector<double> warm(data_->qacc_warmstart, data_->qacc_warmstart + model_->nv);
       build(std::max(count, 2 * map_boxes_));
       put_state();
-      mju_copy(data_->qacc_warmstart, warm.data(), model_->nv);
+      std::copy_n(warm.data(), model_->nv, data_->qacc_warmstart);
       return arrive(true);
     }
-    near_.place(field, *model_, mj_name2id(model_.get(), mjOBJ_BODY, map_body_name));
+    near_.place(field, *model_, api().mj_name2id(model_.get(), mjOBJ_BODY, map_body_name));
   }
 
   // MuJoCo resets a state with numbers that are not finite or too large, and counts a warning.
@@ -244,9 +246,9 @@ class MujocoPlant final : public simulation::Plant {
       if (link < 0) continue;
       const geometry::SE3 pose = dynamics::frame_pose(setup_.model, ws_, each.frame);
       const dynamics::Vector6d wrench = dynamics::aligned_wrench(each, pose);
-      mj_applyFT(model_.get(), data_.get(), wrench.data() + 3, wrench.data(), pose.p().data(),
-                 mj_name2id(model_.get(), mjOBJ_BODY, link_name(link).c_str()),
-                 data_->qfrc_applied);
+      api().mj_applyFT(model_.get(), data_.get(), wrench.data() + 3, wrench.data(), pose.p().data(),
+                       api().mj_name2id(model_.get(), mjOBJ_BODY, link_name(link).c_str()),
+                       data_->qfrc_applied);
     }
   }
 
@@ -263,7 +265,7 @@ class MujocoPlant final : public simulation::Plant {
   }
 
   [[nodiscard]] ShapeId shape(int geom) const {
-    return id_of(mj_id2name(model_.get(), mjOBJ_GEOM, geom));
+    return id_of(api().mj_id2name(model_.get(), mjOBJ_GEOM, geom));
   }
 
   [[nodiscard]] std::string describe_shape(int geom) const {

@@ -13,11 +13,11 @@
 #include "hamelin/optimal/scene_motion.hpp"
 #include "hamelin/optimal/world_clearance.hpp"
 #ifdef HAMELIN_HAS_IPOPT
-#include "../src/ipopt_solver.hpp"
+#include "ipopt_solver.hpp"
 #include "trapezoidal.hpp"
 #endif
 
-// hamelin_motion_table [--only banded|ipopt|trapezoidal] [--least effort|time] [--intervals N]
+// hamelin_motion_table [--only banded|trapezoidal] [--least effort|time] [--intervals N]
 // SCENE...: optimises the motion to the first goal of each scene, along the path of its guide
 // (rrt-connect without one), and prints cost, time, iterations, CPU time of the solver, violation,
 // certificate, and the error if the torques move the arm.
@@ -45,10 +45,9 @@ struct Case {
   control::WorldView& view;
 };
 
-Row by_splines(const Case& c, Solver solver) {
+Row by_splines(const Case& c) {
   SceneMotionOptions wanted;
   wanted.objective = c.problem.objective;
-  wanted.solve.solver = solver;
   const SolveOptions options = solve_options(wanted);
   Row row;
   const double since = cpu_s();
@@ -136,9 +135,8 @@ void tabulate(const std::string& file, const Options& options) {
     const auto wants = [&](const char* method) {
       return options.only.empty() || options.only == method;
     };
-    if (wants("banded")) print(scene.name, least, "banded", by_splines(c, Solver::banded));
+    if (wants("banded")) print(scene.name, least, "banded", by_splines(c));
 #ifdef HAMELIN_HAS_IPOPT
-    if (wants("ipopt")) print(scene.name, least, "ipopt", by_splines(c, Solver::ipopt));
     if (wants("trapezoidal"))
       print(scene.name, least, "trapezoidal", by_trapezoidal_collocation(c));
 #endif

@@ -5,11 +5,13 @@
 #include <cmath>
 #include <filesystem>
 
-#include "../src/ipopt_solver.hpp"
 #include "execution.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/optimal/optimize.hpp"
+#ifdef HAMELIN_HAS_IPOPT
+#include "ipopt_solver.hpp"
 #include "trapezoidal.hpp"
+#endif
 
 using namespace hamelin;
 using namespace hamelin::optimal;
@@ -43,12 +45,11 @@ double milliseconds_of(F&& f) {
       .count();
 }
 
-Row discrete_mechanics(const Problem& problem, const MatrixXd& guess, Solver solver) {
-  SolveOptions options;
-  options.solver = solver;
+Row discrete_mechanics(const Problem& problem, const MatrixXd& guess,
+                       Solution (*solver)(const Problem&, const MatrixXd&, const SolveOptions&)) {
   Solution found;
   Row row;
-  row.milliseconds = milliseconds_of([&] { found = solve(problem, guess, options); });
+  row.milliseconds = milliseconds_of([&] { found = solver(problem, guess, {}); });
   row.converged = found.converged;
   row.cost = found.cost;
   row.iterations = found.iterations;
@@ -136,10 +137,10 @@ TEST_CASE("discrete mechanics beside trapezoidal collocation at equal knots",
         const Problem problem = problem_of(model, objective, intervals);
         const MatrixXd guess = straight_guess(problem);
         print(model.robot().name.c_str(), problem, "discrete mechanics, banded",
-              discrete_mechanics(problem, guess, Solver::banded));
+              discrete_mechanics(problem, guess, &solve));
 #ifdef HAMELIN_HAS_IPOPT
         print(model.robot().name.c_str(), problem, "discrete mechanics, IPOPT",
-              discrete_mechanics(problem, guess, Solver::ipopt));
+              discrete_mechanics(problem, guess, &solve_by_ipopt));
         print(model.robot().name.c_str(), problem, "trapezoidal, IPOPT",
               trapezoidal(problem, guess));
 #endif

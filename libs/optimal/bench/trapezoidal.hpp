@@ -1,7 +1,7 @@
 #pragma once
-#include "../src/nonlinear_program.hpp"
 #include "hamelin/dynamics/derivatives.hpp"
 #include "hamelin/optimal/problem.hpp"
+#include "nonlinear_program.hpp"
 
 namespace hamelin::optimal {
 

@@ -301,7 +301,6 @@ Json to_json(const SceneMotion& motion, const SceneMotionOptions& options,
           {"robot", motion.robot},
           {"joints", motion.joints},
           {"minimize", options.objective == Objective::time ? "time" : "effort"},
-          {"solver", options.solve.solver == Solver::ipopt ? "ipopt" : "banded"},
           {"goals", std::move(goals)},
           {"points", std::move(points)}};
 }

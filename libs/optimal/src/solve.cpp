@@ -10,10 +10,6 @@
 #include "interior_point.hpp"
 #include "refuse.hpp"
 #include "transcription.hpp"
-#ifdef HAMELIN_HAS_IPOPT
-#include "ipopt_solver.hpp"
-#include "transcription_program.hpp"
-#endif
 
 namespace hamelin::optimal {
 
@@ -40,26 +36,6 @@ void check_options(const SolveOptions& options) {
   if (options.iterations_max < 0)
     refuse(fmt::format("{} iterations given, expected 0 or more", options.iterations_max));
 }
-
-#ifdef HAMELIN_HAS_IPOPT
-Solution solve_with_ipopt(Transcription& program, const VectorXd& guess,
-                          const SolveOptions& options) {
-  TranscriptionProgram adapted(program);
-  const IpoptResult found = solve_by_ipopt(adapted, guess, options);
-  Solution out;
-  out.converged = found.converged;
-  out.cause = found.cause;
-  out.iterations = found.iterations;
-  out.stationarity = found.stationarity;
-  return out;
-}
-#else
-Solution solve_with_ipopt(Transcription&, const VectorXd&, const SolveOptions&) {
-  throw Error(ErrorCode::usage,
-              "solver ipopt: this build has no IPOPT, expected solver banded, or a build with "
-              "coinor-libipopt-dev installed");
-}
-#endif
 
 // Less violation, or the same and less cost; violations within the tolerance are none.
 bool better(double violation, double cost, double than_violation, double than_cost,
@@ -103,12 +79,18 @@ Solution solve_banded(Transcription& program, const VectorXd& guess, const Solve
 
 }  // namespace
 
-bool has_ipopt() noexcept {
-#ifdef HAMELIN_HAS_IPOPT
-  return true;
-#else
-  return false;
-#endif
+void complete(Solution& found, const Transcription& program, double no_violation) {
+  found.violation = program.violation(&found.violated);
+  if (found.violation <= no_violation) {
+    found.violated.clear();
+  } else if (found.converged) {
+    found.converged = false;
+    found.cause = "bounds are violated by more than the tolerance";
+  }
+  found.cost = program.cost();
+  found.control = program.points().q;
+  found.torque = program.torques();
+  found.step_s = program.points().h;
 }
 
 Solution solve(const Problem& problem, const MatrixXd& guess, const SolveOptions& options) {
@@ -117,20 +99,8 @@ Solution solve(const Problem& problem, const MatrixXd& guess, const SolveOptions
   check_options(options);
   Transcription program(problem);
   const VectorXd x = program.variables_of(guess);
-  Solution out = options.solver == Solver::ipopt
-                     ? solve_with_ipopt(program, x, options)
-                     : solve_banded(program, x, options, problem.clearance != nullptr);
-  out.violation = program.violation(&out.violated);
-  if (out.violation <= options.no_violation()) {
-    out.violated.clear();
-  } else if (out.converged) {
-    out.converged = false;
-    out.cause = "bounds are violated by more than the tolerance";
-  }
-  out.cost = program.cost();
-  out.control = program.points().q;
-  out.torque = program.torques();
-  out.step_s = program.points().h;
+  Solution out = solve_banded(program, x, options, problem.clearance != nullptr);
+  complete(out, program, options.no_violation());
   return out;
 }
 

@@ -3,6 +3,7 @@
 
 #include "banded.hpp"
 #include "clearance_rows.hpp"
+#include "hamelin/optimal/solve.hpp"
 #include "quotient_rows.hpp"
 #include "step_row.hpp"
 #include "torques.hpp"
@@ -83,5 +84,9 @@ class Transcription {
   double cost_ = 0.0;
   VectorXd values_;
 };
+
+/// What is known of the point at which a solver left the program: violation, cost and motion.
+/// @param no_violation what counts as none
+void complete(Solution& found, const Transcription& program, double no_violation);
 
 }  // namespace hamelin::optimal

@@ -10,6 +10,9 @@
 #include "hamelin/test/errors.hpp"
 #include "hamelin/test/robots.hpp"
 #include "hamelin/test/skip.hpp"
+#ifdef HAMELIN_HAS_IPOPT
+#include "../bench/ipopt_solver.hpp"
+#endif
 
 using namespace hamelin;
 using namespace hamelin::optimal;
@@ -120,13 +123,15 @@ TEST_CASE("both solvers find the same motion", "[optimal]") {
   CAPTURE(found.cause, found.iterations, found.violation, found.stationarity, found.cost);
   CHECK(found.converged);
   CHECK(found.violation == 0.0);
-  test::skip_unless(has_ipopt(), "this build is without Ipopt");
-  options.solver = Solver::ipopt;
-  const Solution reference = solve(problem, guess, options);
+#ifdef HAMELIN_HAS_IPOPT
+  const Solution reference = solve_by_ipopt(problem, guess, options);
   CAPTURE(reference.cause, reference.iterations, reference.cost);
   CHECK(reference.converged);
   CHECK(found.cost == Approx(reference.cost).epsilon(1e-9));
   CHECK((found.control - reference.control).norm() <= 1e-4);
+#else
+  test::skip("this build is without Ipopt");
+#endif
 }
 
 TEST_CASE("a motion keeps its limits at all times and its ends exactly", "[optimal]") {
@@ -306,8 +311,6 @@ TEST_CASE("the least time where the goal is the start is the least duration, at 
   problem.v_start.setZero();
   problem.v_goal.setZero();
   SolveOptions options;
-  options.solver = GENERATE(Solver::banded, Solver::ipopt);
-  if (options.solver == Solver::ipopt && !has_ipopt()) return;
   const Solution found =
       solve(problem, guess_along((MatrixXd(4, 2) << problem.q_start, problem.q_goal).finished(), 8),
             options);

@@ -239,7 +239,6 @@ def optimize(
     limit_share: float | None = None,
     acceleration: float | None = None,
     jerk: float | None = None,
-    solver: str = "banded",
     set: str | Sequence[str] | None = None,  # noqa: A002
     rate: float | None = None,
 ) -> Motion:
@@ -250,8 +249,8 @@ def optimize(
     minimize: "effort" or "time". duration: time to each goal [s]; None: at half of the velocity
     limits. intervals: between knots, to each goal. margin: least clearance [m]. limit_share: share
     of the limits of velocity and torque that the motion may use; None: all of the velocities, 0.9
-    of the torques. acceleration, jerk: limits of all joints [rad/s^2 or m/s^2, and per s]. solver:
-    "banded" or "ipopt". rate: points per second [1/s]; None: the knots.
+    of the torques. acceleration, jerk: limits of all joints [rad/s^2 or m/s^2, and per s].
+    rate: points per second [1/s]; None: the knots.
     """
     made = as_scene(scene, overrides_of(guide=guide, set=set))
     document, valid = _optimize(
@@ -264,7 +263,6 @@ def optimize(
             "limit_share": limit_share,
             "acceleration": acceleration,
             "jerk": jerk,
-            "solver": solver,
             "rate": rate,
         },
     )

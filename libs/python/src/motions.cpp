@@ -96,8 +96,6 @@ optimal::SceneMotionOptions options_of(const py::dict& given) {
   optimal::SceneMotionOptions options;
   options.objective = one_of("minimize", given["minimize"].cast<std::string>(), "effort",
                              optimal::Objective::effort, "time", optimal::Objective::time);
-  options.solve.solver = one_of("solver", given["solver"].cast<std::string>(), "banded",
-                                optimal::Solver::banded, "ipopt", optimal::Solver::ipopt);
   options.intervals = within("intervals", given["intervals"].cast<int>(), optimal::least_intervals,
                              optimal::most_intervals);
   options.margin_m = within("margin", given["margin"].cast<double>(), 0.0, 0.1);

@@ -77,7 +77,6 @@ def test_optimize_is_that_of_the_program(program, scenes, tmp_path):
         ({"margin": float("nan")}, "margin: nan"),
         ({"limit_share": 0.0}, "limit_share"),
         ({"duration": -1.0}, "duration"),
-        ({"solver": "guess"}, "solver"),
         ({"rate": 0.0}, "rate"),
     ],
 )

@@ -1,6 +1,5 @@
 #include "hamelin/reactive/law.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -104,20 +103,16 @@ double Law::attract(const model::Model& model, const dynamics::Workspace& ws,
     desired.tail<3>() = position * std::min(params_.tip_gain, params_.tip_speed / error);
   const double rate =
       2.0 * desired.tail<3>().norm() + 0.5 / rotation_length * desired.head<3>().norm();
-  Eigen::Matrix<double, 6, 6> G = J_ * J_.transpose();
-  const double scale = std::max(1e-6, G.trace());
-  G.diagonal().array() += relative_damping * scale;
-  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(G);
-  u.noalias() = J_.transpose() * factor.solve(desired).eval();
+  inverse_.factor_relative(J_, relative_damping, 1e-6);
+  inverse_.apply(desired, u);
   const double fastest = u.lpNorm<Eigen::Infinity>();
   if (fastest > params_.cruise_speed) u *= params_.cruise_speed / fastest;
   if (middle_.size() == 0) return rate;
   centring_ = centring_gain * (middle_ - q);
   // Centring must not push the tip off its goal, so this projection is almost undamped.
-  G.diagonal().array() -= (relative_damping - projection_damping) * scale;
-  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> projector(G);
+  inverse_.damp_relative(projection_damping);
   const Eigen::Matrix<double, 6, 1> tip_motion = J_ * centring_;
-  scratch_.noalias() = J_.transpose() * projector.solve(tip_motion).eval();
+  inverse_.apply(tip_motion, scratch_);
   u += centring_ - scratch_;
   return rate;
 }

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <numbers>
@@ -31,7 +30,7 @@ constexpr double lean_rate = 2.0;  // per curve
 
 WayFollower::WayFollower(const model::Model& model, const dynamics::JointBox& box)
     : model_(model), box_(box), ws_(model), J_(6, model.dof()) {
-  for (VectorXd* x : {&from_, &q_, &bias_, &step_}) x->setZero(model.dof());
+  for (VectorXd* x : {&from_, &q_, &bias_, &step_, &held_}) x->setZero(model.dof());
 }
 
 FollowedWay WayFollower::follow(const TipCurve& curve, const scene::WayTolerance& tolerance,
@@ -99,8 +98,7 @@ void WayFollower::set_jacobian() {
   dynamics::frame_jacobian(model_, ws_, model_.robot().tip.link,
                            dynamics::tip_pose(model_, ws_).p(), J_);
   J_.topRows<3>() *= tolerance_.rad < std::numbers::pi ? rotation_length : 0.0;
-  G_.noalias() = J_ * J_.transpose();
-  G_.diagonal().array() += reach_damping;
+  inverse_.factor(J_, reach_damping);
   ++checks_;
 }
 
@@ -108,7 +106,8 @@ void WayFollower::lean(double share) {
   set_jacobian();
   step_ = std::min(1.0, lean_rate * share) * (bias_ - q_);
   const Eigen::Matrix<double, 6, 1> moved = J_ * step_;
-  step_.noalias() -= J_.transpose() * G_.llt().solve(moved);
+  inverse_.apply(moved, held_);
+  step_ -= held_;
   q_ = (q_ + step_).cwiseMax(box_.lower).cwiseMin(box_.upper);
 }
 
@@ -124,7 +123,7 @@ bool WayFollower::reach(const geometry::SE3& target) {
     if (error.tail<3>().norm() < on_curve_share * tolerance_.m &&
         error.head<3>().norm() < rotation_length * on_curve_share * tolerance_.rad)
       return true;
-    step_.noalias() = J_.transpose() * G_.llt().solve(error);
+    inverse_.apply(error, step_);
     const double largest = step_.lpNorm<Eigen::Infinity>();
     if (largest > reach_step) step_ *= reach_step / largest;
     q_ = (q_ + step_).cwiseMax(box_.lower).cwiseMin(box_.upper);

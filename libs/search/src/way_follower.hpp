@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "hamelin/core/rng.hpp"
+#include "hamelin/dynamics/damped_inverse.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/dynamics/joint_box.hpp"
 #include "hamelin/scene/goal.hpp"
@@ -51,9 +52,9 @@ class WayFollower {
   dynamics::Workspace ws_;
   scene::WayTolerance tolerance_;
   bool leans_ = false;
-  Eigen::VectorXd from_, q_, bias_, step_;
+  Eigen::VectorXd from_, q_, bias_, step_, held_;  ///< held_: what of a step moves the tip
   dynamics::Matrix6Xd J_;
-  Eigen::Matrix<double, 6, 6> G_;
+  dynamics::DampedInverse inverse_;
   long checks_ = 0;
 };
 

@@ -171,7 +171,8 @@ class ServoActuation final : public SampledActuation {
     VectorXd q, v;
   };
 
-  // docs/theory.md (8.15) at the start: all modes are stable if 2M - diag(gain) is positive definite.
+  // docs/theory.md (8.15) at the start: all modes are stable if 2M - diag(gain) is positive
+  // definite.
   void check_stability(const scene::Scene& scene, const model::Model& model) {
     const double h = scene.step_s;
     Eigen::MatrixXd M(model.dof(), model.dof());

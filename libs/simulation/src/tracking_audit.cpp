@@ -1,6 +1,5 @@
 #include "tracking_audit.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -118,9 +117,8 @@ bool TrackingAudit::solve(const scene::Goal& goal, const geometry::SE3& target) 
     error.head<3>() *= ik_length;
     dynamics::frame_jacobian(model_, ws_, model_.robot().tip.link, tip.p(), J_);
     J_.topRows<3>() *= goal.position_only ? 0.0 : ik_length;
-    Eigen::Matrix<double, 6, 6> G = J_ * J_.transpose();
-    G.diagonal().array() += ik_damping;
-    step_ = J_.transpose() * G.llt().solve(error);
+    inverse_.factor(J_, ik_damping);
+    inverse_.apply(error, step_);
     const double size = step_.norm();
     if (size > ik_step_max) step_ *= ik_step_max / size;
     q_ += step_;

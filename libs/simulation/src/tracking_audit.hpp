@@ -6,6 +6,7 @@
 #include "hamelin/control/controller.hpp"
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/world_view.hpp"
+#include "hamelin/dynamics/damped_inverse.hpp"
 #include "hamelin/log/result.hpp"
 
 namespace hamelin::simulation {
@@ -50,6 +51,7 @@ class TrackingAudit {
   const control::ModelledLimits& limits_;
   dynamics::Workspace ws_;
   dynamics::Matrix6Xd J_;
+  dynamics::DampedInverse inverse_;
   Eigen::VectorXd q_, step_, between_;
   control::GoalError error_;
   bool free_ = false, observed_ = false;

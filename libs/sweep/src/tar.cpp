@@ -7,10 +7,52 @@
 #include <vector>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/shared_library.hpp"
 
 namespace hamelin::sweep {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+// The functions of libarchive that are used; it is loaded for the first archive.
+struct Libarchive {
+  SharedLibrary library{HAMELIN_LIBARCHIVE_FILE, "packing a sweep"};
+  HAMELIN_LOADED(library, archive_entry_filetype);
+  HAMELIN_LOADED(library, archive_entry_free);
+  HAMELIN_LOADED(library, archive_entry_hardlink);
+  HAMELIN_LOADED(library, archive_entry_new);
+  HAMELIN_LOADED(library, archive_entry_pathname);
+  HAMELIN_LOADED(library, archive_entry_set_filetype);
+  HAMELIN_LOADED(library, archive_entry_set_mtime);
+  HAMELIN_LOADED(library, archive_entry_set_pathname);
+  HAMELIN_LOADED(library, archive_entry_set_perm);
+  HAMELIN_LOADED(library, archive_entry_set_size);
+  HAMELIN_LOADED(library, archive_error_string);
+  HAMELIN_LOADED(library, archive_read_data);
+  HAMELIN_LOADED(library, archive_read_free);
+  HAMELIN_LOADED(library, archive_read_new);
+  HAMELIN_LOADED(library, archive_read_next_header);
+  HAMELIN_LOADED(library, archive_read_open_filename);
+  HAMELIN_LOADED(library, archive_read_support_filter_zstd);
+  HAMELIN_LOADED(library, archive_read_support_format_tar);
+  HAMELIN_LOADED(library, archive_write_add_filter_zstd);
+  HAMELIN_LOADED(library, archive_write_close);
+  HAMELIN_LOADED(library, archive_write_data);
+  HAMELIN_LOADED(library, archive_write_free);
+  HAMELIN_LOADED(library, archive_write_header);
+  HAMELIN_LOADED(library, archive_write_new);
+  HAMELIN_LOADED(library, archive_write_open);
+  HAMELIN_LOADED(library, archive_write_set_bytes_in_last_block);
+  HAMELIN_LOADED(library, archive_write_set_format_pax_restricted);
+};
+
+const Libarchive& libarchive() {
+  static const Libarchive functions;
+  return functions;
+}
+
+}  // namespace
 
 constexpr std::size_t block_size = std::size_t{1} << 16;
 
@@ -26,29 +68,33 @@ la_ssize_t TarWriter::write_block(archive*, void* writer, const void* bytes, std
 }
 
 TarWriter::TarWriter(const fs::path& file)
-    : name_(file.string()), out_(file), archive_(archive_write_new(), &archive_write_free) {
-  check(archive_write_set_format_pax_restricted(archive_.get()));
-  check(archive_write_add_filter_zstd(archive_.get()));
-  check(archive_write_set_bytes_in_last_block(archive_.get(), 1));  // no padding after the end
-  check(archive_write_open(archive_.get(), this, nullptr, &TarWriter::write_block, nullptr));
+    : name_(file.string()),
+      out_(file),
+      archive_(libarchive().archive_write_new(), libarchive().archive_write_free) {
+  check(libarchive().archive_write_set_format_pax_restricted(archive_.get()));
+  check(libarchive().archive_write_add_filter_zstd(archive_.get()));
+  check(libarchive().archive_write_set_bytes_in_last_block(archive_.get(),
+                                                           1));  // no padding after the end
+  check(libarchive().archive_write_open(archive_.get(), this, nullptr, &TarWriter::write_block,
+                                        nullptr));
 }
 
 void TarWriter::add(const std::string& name, std::string_view bytes) {
-  const std::unique_ptr<archive_entry, decltype(&archive_entry_free)> entry(archive_entry_new(),
-                                                                            &archive_entry_free);
-  archive_entry_set_pathname(entry.get(), name.c_str());
-  archive_entry_set_size(entry.get(), static_cast<la_int64_t>(bytes.size()));
-  archive_entry_set_filetype(entry.get(), AE_IFREG);
-  archive_entry_set_perm(entry.get(), 0644);
-  archive_entry_set_mtime(entry.get(), 0, 0);
-  check(archive_write_header(archive_.get(), entry.get()));
-  if (archive_write_data(archive_.get(), bytes.data(), bytes.size()) !=
+  const std::unique_ptr<archive_entry, decltype(&archive_entry_free)> entry(
+      libarchive().archive_entry_new(), libarchive().archive_entry_free);
+  libarchive().archive_entry_set_pathname(entry.get(), name.c_str());
+  libarchive().archive_entry_set_size(entry.get(), static_cast<la_int64_t>(bytes.size()));
+  libarchive().archive_entry_set_filetype(entry.get(), AE_IFREG);
+  libarchive().archive_entry_set_perm(entry.get(), 0644);
+  libarchive().archive_entry_set_mtime(entry.get(), 0, 0);
+  check(libarchive().archive_write_header(archive_.get(), entry.get()));
+  if (libarchive().archive_write_data(archive_.get(), bytes.data(), bytes.size()) !=
       static_cast<la_ssize_t>(bytes.size()))
     check(ARCHIVE_FATAL);
 }
 
 void TarWriter::commit() {
-  check(archive_write_close(archive_.get()));
+  check(libarchive().archive_write_close(archive_.get()));
   out_.commit();
 }
 
@@ -56,28 +102,31 @@ void TarWriter::check(int result) {
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
   if (result != ARCHIVE_OK)
     throw Error(ErrorCode::io, fmt::format("{}: cannot be written: {}", name_,
-                                           archive_error_string(archive_.get())));
+                                           libarchive().archive_error_string(archive_.get())));
 }
 
 TarReader::TarReader(const fs::path& file)
-    : file_(file), archive_(archive_read_new(), &archive_read_free) {
+    : file_(file), archive_(libarchive().archive_read_new(), libarchive().archive_read_free) {
   std::error_code ec;
   if (!fs::is_regular_file(file, ec))
     throw Error(ErrorCode::io,
                 fmt::format("{}: is not a file, expected an archive of `hamelin sweep pack`",
                             file.string()));
-  archive_read_support_format_tar(archive_.get());
-  archive_read_support_filter_zstd(archive_.get());
-  if (archive_read_open_filename(archive_.get(), file.c_str(), block_size) != ARCHIVE_OK) fail();
+  libarchive().archive_read_support_format_tar(archive_.get());
+  libarchive().archive_read_support_filter_zstd(archive_.get());
+  if (libarchive().archive_read_open_filename(archive_.get(), file.c_str(), block_size) !=
+      ARCHIVE_OK)
+    fail();
 }
 
 bool TarReader::next() {
-  const int result = archive_read_next_header(archive_.get(), &entry_);
+  const int result = libarchive().archive_read_next_header(archive_.get(), &entry_);
   if (result == ARCHIVE_EOF) return false;
   if (result != ARCHIVE_OK) fail();
-  const char* name = archive_entry_pathname(entry_);
+  const char* name = libarchive().archive_entry_pathname(entry_);
   name_ = name == nullptr ? "" : name;
-  if (archive_entry_filetype(entry_) != AE_IFREG || archive_entry_hardlink(entry_) != nullptr)
+  if (libarchive().archive_entry_filetype(entry_) != AE_IFREG ||
+      libarchive().archive_entry_hardlink(entry_) != nullptr)
     refuse(fmt::format("'{}' is not a file, expected files only", name_));
   return true;
 }
@@ -103,7 +152,7 @@ void TarReader::extract(const fs::path& to) {
 }
 
 std::size_t TarReader::read(char* to, std::size_t most) {
-  const auto count = archive_read_data(archive_.get(), to, most);
+  const auto count = libarchive().archive_read_data(archive_.get(), to, most);
   if (count < 0) fail();
   return static_cast<std::size_t>(count);
 }
@@ -113,7 +162,7 @@ void TarReader::refuse(const std::string& problem) const {
 }
 
 void TarReader::fail() const {
-  const char* text = archive_error_string(archive_.get());
+  const char* text = libarchive().archive_error_string(archive_.get());
   refuse(fmt::format("is not an archive of `hamelin sweep pack`, or is damaged: {}",
                      text == nullptr ? "unknown error" : text));
 }

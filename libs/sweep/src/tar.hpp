@@ -30,7 +30,7 @@ class TarWriter {
   std::string name_;
   AtomicFile out_;
   std::exception_ptr failure_;  ///< of writing, which cannot pass through the library in C
-  std::unique_ptr<archive, decltype(&archive_write_free)> archive_;
+  std::unique_ptr<archive, int (*)(archive*)> archive_;
 };
 
 /// Reads an archive file by file. @throws Error invalid, as all functions of this class, if it is
@@ -51,7 +51,7 @@ class TarReader {
   [[noreturn]] void fail() const;
 
   std::filesystem::path file_;
-  std::unique_ptr<archive, decltype(&archive_read_free)> archive_;
+  std::unique_ptr<archive, int (*)(archive*)> archive_;
   archive_entry* entry_ = nullptr;
   std::string name_;
 };

@@ -140,6 +140,5 @@ TEST_CASE("optimize refuses bad input in one line", "[optimize]") {
   CHECK_THAT(refused({"--margin", "0.01"}),
              Contains("start: the clearance is 0.00902") && Contains("the margin 0.01 m"));
   CHECK_THAT(refused({"-o", pillar}), Contains(pillar));
-  if (!optimal::has_ipopt())
-    CHECK_THAT(refused({"--solver", "ipopt"}), Contains("coinor-libipopt-dev"));
+  CHECK_THAT(refused({"--solver", "ipopt"}), Contains("--solver"));
 }

@@ -37,14 +37,14 @@
 /// instruction set. A source under hamelin_isa_sources defines one such object per set. Use the
 /// macro in the namespace that encloses theirs. The function throws an Error for a set that this
 /// machine or this build does not have.
-#define HAMELIN_SELECT_KERNELS(Set, name)                                   \
-  HAMELIN_DECLARE_BASELINE(Set, name)                                       \
-  HAMELIN_DECLARE_V3(Set, name)                                             \
-  HAMELIN_DECLARE_V4(Set, name)                                             \
-  static const Set& select_##name(Isa isa) {                                \
-    require_available(isa);                                                 \
-    HAMELIN_RETURN_BASELINE(isa, name)                                      \
-    HAMELIN_RETURN_V3(isa, name)                                            \
-    HAMELIN_RETURN_V4(isa, name)                                            \
-    __builtin_unreachable();                                                \
+#define HAMELIN_SELECT_KERNELS(Set, name)    \
+  HAMELIN_DECLARE_BASELINE(Set, name)        \
+  HAMELIN_DECLARE_V3(Set, name)              \
+  HAMELIN_DECLARE_V4(Set, name)              \
+  static const Set& select_##name(Isa isa) { \
+    require_available(isa);                  \
+    HAMELIN_RETURN_BASELINE(isa, name)       \
+    HAMELIN_RETURN_V3(isa, name)             \
+    HAMELIN_RETURN_V4(isa, name)             \
+    __builtin_unreachable();                 \
   }

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
+#include "hamelin/dynamics/damped_inverse.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/dynamics/joint_box.hpp"
 
@@ -39,6 +40,7 @@ class InverseKinematics {
   const JointBox& box_;
   Workspace ws_;
   Matrix6Xd J_;
+  DampedInverse inverse_;
   Eigen::VectorXd step_;
   int iterations_ = 0;
 };

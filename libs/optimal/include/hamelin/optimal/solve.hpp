@@ -8,27 +8,18 @@
 
 namespace hamelin::optimal {
 
-enum class Solver : std::int32_t {
-  banded,  ///< an interior-point method on the banded equations, docs/theory.md (18.9)–(18.12)
-  ipopt,   ///< IPOPT, where this build has it
-};
-
-/// Whether this build has IPOPT.
-[[nodiscard]] bool has_ipopt() noexcept;
-
 struct SolveOptions {
-  Solver solver = Solver::banded;
   int iterations_max = 300;  ///< of one start
   /// On stationarity, violation of bounds as shares of them, and complementarity; positive.
   double tolerance = 1e-8;
-  /// Solver::banded also ends where about this share of the cost may be left to gain, and bounds
+  /// The solver also ends where about this share of the cost may be left to gain, and bounds
   /// are violated by no more than violation_max; zero: never.
   double cost_tolerance = 0.0;
   /// Violation that counts as none where it is more than the tolerance, as a share of the bounds,
   /// or in decimetres of clearance.
   double violation_max = 0.0;
   [[nodiscard]] double no_violation() const noexcept { return std::max(tolerance, violation_max); }
-  /// Whether the guess is the solution of a similar problem. Used by Solver::banded.
+  /// Whether the guess is the solution of a similar problem.
   bool near_solution = false;
   /// Asked before each iteration; true ends the solution. Optional.
   std::function<bool()> stop;
@@ -50,13 +41,12 @@ struct Solution {
   double stationarity = infinity;
 };
 
-/// Solves the problem on the discrete equations of motion, docs/theory.md (18.1)–(18.8).
-/// Of the starts that the banded solver makes, the one that violates least is returned, and of
-/// these the cheapest.
+/// Solves the problem on the discrete equations of motion, docs/theory.md (18.1)–(18.8), by an
+/// interior-point method on the banded equations, (18.9)–(18.12). Of its starts, the one that
+/// violates least is returned, and of these the cheapest.
 /// @param guess knots, dof × (N + 1), finite, of which the inner ones are used
 /// @throws Error invalid for a Problem that check() refuses, a guess of another size and options
-/// out
-///         of their range; usage for a solver that is not there
+///         out of their range
 [[nodiscard]] Solution solve(const Problem& problem, const MatrixXd& guess,
                              const SolveOptions& options = {});
 

@@ -8,18 +8,10 @@ namespace hamelin::reactive {
 /// The mass matrix at a configuration, and its inverse. Only the constructor allocates.
 class Inertia {
  public:
-  explicit Inertia(Eigen::Index dof)
-      : identity_(Eigen::MatrixXd::Identity(dof, dof)), M_(identity_), W_(identity_) {
-    llt_.compute(identity_);  // allocates its memory
-  }
+  explicit Inertia(Eigen::Index dof);
 
   /// @param ws scratch: it does not contain the forward kinematics at q afterwards
-  void update(const model::Model& model, dynamics::Workspace& ws, const Eigen::VectorXd& q) {
-    dynamics::mass_matrix(model, ws, q, M_);
-    llt_.compute(M_);
-    W_ = identity_;
-    llt_.solveInPlace(W_);
-  }
+  void update(const model::Model& model, dynamics::Workspace& ws, const Eigen::VectorXd& q);
   [[nodiscard]] const Eigen::MatrixXd& M() const noexcept { return M_; }
   /// M⁻¹.
   [[nodiscard]] const Eigen::MatrixXd& W() const noexcept { return W_; }

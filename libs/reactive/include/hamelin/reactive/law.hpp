@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
+#include "hamelin/dynamics/damped_inverse.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "hamelin/reactive/obstacles.hpp"
@@ -67,6 +68,7 @@ class Law {
   LawParams params_;
   Eigen::VectorXd middle_;  ///< of the joint limits; empty where they are not modelled
   dynamics::Matrix6Xd J_;
+  dynamics::DampedInverse inverse_;
   Eigen::VectorXd centring_, scratch_;
 };
 

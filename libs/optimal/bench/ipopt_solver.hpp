@@ -19,4 +19,8 @@ struct IpoptResult {
 [[nodiscard]] IpoptResult solve_by_ipopt(NonlinearProgram& program, const Eigen::VectorXd& guess,
                                          const SolveOptions& options);
 
+/// The problem of `solve`, by IPOPT.
+[[nodiscard]] Solution solve_by_ipopt(const Problem& problem, const MatrixXd& guess,
+                                      const SolveOptions& options);
+
 }  // namespace hamelin::optimal

@@ -1,6 +1,6 @@
 #pragma once
+#include "../src/transcription.hpp"
 #include "nonlinear_program.hpp"
-#include "transcription.hpp"
 
 namespace hamelin::optimal {
 

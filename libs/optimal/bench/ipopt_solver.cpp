@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "transcription_program.hpp"
+
 namespace hamelin::optimal {
 
 namespace {
@@ -150,6 +152,20 @@ IpoptResult solve_by_ipopt(NonlinearProgram& program, const Eigen::VectorXd& gue
     result.cause = "IPOPT ended with status " + std::to_string(static_cast<int>(status));
   (void)program.evaluate(result.x);
   return result;
+}
+
+Solution solve_by_ipopt(const Problem& problem, const MatrixXd& guess,
+                        const SolveOptions& options) {
+  Transcription program(problem);
+  TranscriptionProgram adapted(program);
+  const IpoptResult found = solve_by_ipopt(adapted, program.variables_of(guess), options);
+  Solution out;
+  out.converged = found.converged;
+  out.cause = found.cause;
+  out.iterations = found.iterations;
+  out.stationarity = found.stationarity;
+  complete(out, program, options.no_violation());
+  return out;
 }
 
 }  // namespace hamelin::optimal
