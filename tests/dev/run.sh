@@ -16,7 +16,7 @@ done
 
 # A PATH with only the tools that the script itself needs, so that no installed program is found by
 # accident.
-for tool in bash sh env dirname cat grep sed xargs head nproc rm cp mv mkdir mktemp; do
+for tool in bash sh env dirname cat grep sed xargs head nproc rm cp mv mkdir mktemp sort; do
   ln -s "$(command -v "$tool")" "$work/system/$tool"
 done
 stub() { # NAME EXIT_CODE: makes a program that records its call
@@ -74,6 +74,17 @@ ln -s "$build/lib" "$demo/lib"
 for task in check tidy; do no_package_task "$task without clang-format or clang-tidy" './dev setup --all' "$task"; done
 no_package_task "cover without gcovr" './dev setup --all' cover
 
+configures_for_demo() {
+  called "cmake --preset demo -DHAMELIN_COMMANDS=run;" && called 'cmake --build build/demo --target demo' &&
+    called 'DHAMELIN_INSTRUCTION_SETS=(baseline|v3|v4) '
+}
+run demo
+expect "the demo builds what it runs, for this machine" configures_for_demo
+touch "$demo/CMakeCache.txt"
+keeps_build() { ! called 'cmake --preset' && called 'cmake --build build/demo --target demo'; }
+run demo
+expect "the demo keeps a build that is there" keeps_build
+
 no_page() {
   ((code == 0)) && printed '^outcome +reached' && [[ ! -e "$work/tree/out/shelf.html" ]] &&
     printed '^out/shelf.html: not made, .*run ./dev demo again'
@@ -86,6 +97,25 @@ if [[ -f "$build/share/hamelin/report/page.html" ]]; then
   run demo
   expect "the demo makes the page if its template was built" page
 fi
+
+# ---- quick: the parts with changes, or those that are named ----
+printf '#!/bin/sh\necho " M libs/control/src/a.cpp"\necho " M plugins/hybrid/src/b.cpp"\necho " M docs/c.md"\n' >"$work/stubs/git"
+mkdir -p "$work/tree/libs/control/tests" "$work/tree/libs/scene/tests" "$work/tree/plugins/hybrid/tests" "$work/tree/build/ci"
+touch "$work/tree/build/ci/CMakeCache.txt"
+builds_changed() {
+  called 'cmake --build --preset ci --target hamelin_control_tests hamelin_plugin_hybrid_tests$' &&
+    called 'ctest .*-LE slow -L \^\(control\|plugin_hybrid\)\$'
+}
+stub ctest 0
+run quick
+expect "quick builds and tests what changed" builds_changed
+builds_named() { called 'cmake --build --preset ci --target hamelin_scene_tests$'; }
+run quick scene
+expect "quick builds and tests what is named" builds_named
+refuses_unknown() { printed "^dev: 'no_such': is not a library or plugin with tests"; }
+run quick no_such
+expect "quick names what has no tests" refuses_unknown
+stub git 0
 
 # ---- The last line of ./dev test: tests that could not run count as failed, skipped ones do not ----
 cat >"$work/stubs/ctest" <<'STUB'

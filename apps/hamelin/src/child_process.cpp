@@ -14,7 +14,7 @@
 #include <exception>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/sweep/parent_death.hpp"
+#include "hamelin/core/parent_death.hpp"
 
 namespace hamelin::app {
 
@@ -64,7 +64,7 @@ std::string run_in_child(const std::function<std::string()>& action, double time
   const pid_t parent = ::getpid(), child = ::fork();
   if (child < 0) throw Error(ErrorCode::io, fmt::format("fork: {}", std::strerror(errno)));
   if (child == 0) {
-    sweep::end_with_parent(parent);
+    end_with_parent(parent);
     ::close(pipe_ends[0]);
     ::dup2(STDERR_FILENO, STDOUT_FILENO);
     // The mark says that the action came to its end.

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
-#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,7 +11,7 @@
 #include <cstring>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/sweep/parent_death.hpp"
+#include "hamelin/core/parent_death.hpp"
 
 namespace hamelin::sweep {
 
@@ -91,11 +90,6 @@ pid_t fork_main(const std::vector<std::string>& command, const Main& main, int o
 }
 
 }  // namespace
-
-void end_with_parent(pid_t parent) noexcept {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != parent) ::_exit(not_set_up);  // it died before the line above
-}
 
 Pipe::Pipe() {
   // reading must not block: a process that the run left behind may keep the other end open

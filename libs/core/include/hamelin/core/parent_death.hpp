@@ -1,7 +1,7 @@
 #pragma once
 #include <sys/types.h>
 
-namespace hamelin::sweep {
+namespace hamelin {
 
 /// To be called by a process that was just forked: the system kills it (SIGKILL) as soon as the
 /// thread that forked it has ended, however that ended. Otherwise a run whose planner never returns
@@ -10,4 +10,4 @@ namespace hamelin::sweep {
 /// @param parent the process that called fork; if it is dead already, the caller ends at once
 void end_with_parent(pid_t parent) noexcept;
 
-}  // namespace hamelin::sweep
+}  // namespace hamelin
