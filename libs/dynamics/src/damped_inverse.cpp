@@ -5,14 +5,12 @@
 namespace hamelin::dynamics {
 
 void DampedInverse::factor(const Matrix6Xd& J, double damping) {
-  J_ = &J;
   G_.noalias() = J * J.transpose();
   G_.diagonal().array() += damping;
   factors_.compute(G_);
 }
 
 void DampedInverse::factor_relative(const Matrix6Xd& J, double damping, double least_trace) {
-  J_ = &J;
   G_.noalias() = J * J.transpose();
   trace_ = std::max(least_trace, G_.trace());
   damping_ = damping;
@@ -26,9 +24,10 @@ void DampedInverse::damp_relative(double damping) {
   factors_.compute(G_);
 }
 
-void DampedInverse::apply(const geometry::Vector6d& error, Eigen::VectorXd& out) const {
+void DampedInverse::apply(const Matrix6Xd& J, const geometry::Vector6d& error,
+                          Eigen::VectorXd& out) const {
   const geometry::Vector6d y = factors_.solve(error);
-  out.noalias() = J_->transpose() * y;
+  out.noalias() = J.transpose() * y;
 }
 
 }  // namespace hamelin::dynamics

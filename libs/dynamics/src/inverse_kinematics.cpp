@@ -118,7 +118,7 @@ bool InverseKinematics::solve(const TipTarget& target, Eigen::VectorXd& q) {
     frame_jacobian(model_, ws_, model_.robot().tip.link, tip.p(), J_);
     J_.topRows<3>() *= target.turns ? rotation_length : 0.0;
     inverse_.factor(J_, root_damping);
-    inverse_.apply(error, step_);
+    inverse_.apply(J_, error, step_);
     const double largest = step_.lpNorm<Eigen::Infinity>();
     if (largest > largest_step) step_ *= largest_step / largest;
     q = (q + step_).cwiseMax(box_.lower).cwiseMin(box_.upper);

@@ -17,19 +17,20 @@ TEST_CASE("the damped inverse is that of the singular values", "[dynamics][unit]
   DampedInverse inverse;
   Eigen::VectorXd step(7);
   inverse.factor(J, 0.3);
-  inverse.apply(error, step);
+  inverse.apply(J, error, step);
   CHECK((step - expected(0.3)).norm() < 1e-13);
 
   const double trace = (J * J.transpose()).trace();
   inverse.factor_relative(J, 0.2, 1e-6);
-  inverse.apply(error, step);
+  inverse.apply(J, error, step);
   CHECK((step - expected(0.2 * trace)).norm() < 1e-13);
   inverse.damp_relative(0.01);
-  inverse.apply(error, step);
+  inverse.apply(J, error, step);
   CHECK((step - expected(0.01 * trace)).norm() < 1e-12);
-  inverse.factor_relative(1e-9 * J, 0.2, 1e-6);  // the trace is below the least one
-  inverse.apply(error, step);
-  CHECK((step - 1e-9 * J.transpose() * error / 2e-7).norm() < 1e-12);
+  const Matrix6Xd small = 1e-9 * J;  // its trace is below the least one
+  inverse.factor_relative(small, 0.2, 1e-6);
+  inverse.apply(small, error, step);
+  CHECK((step - small.transpose() * error / 2e-7).norm() < 1e-12);
 }
 
 }  // namespace hamelin::dynamics

@@ -36,20 +36,17 @@ Eigen::Matrix3d rotation_from_wxyz(const Eigen::Vector4d& wxyz) {
       .toRotationMatrix();
 }
 
-// By the quaternion whose half angle is that between the vectors. Eigen's FromTwoVectors does the
-// same, but finds the axis of opposite vectors by a singular value decomposition, which takes the
-// compiler seconds.
+// By the quaternion whose half angle is that between `from` and the middle of both.
 Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const Eigen::Vector3d a = from.normalized(), b = to.normalized();
-  const double c = a.dot(b);
-  constexpr double opposite = -1.0 + 1e-12;
-  if (c < opposite) {
+  const double twice_cos = (a + b).norm();
+  constexpr double opposite = 1e-8;  // nearer to it, the axis is lost to rounding
+  if (twice_cos < opposite) {
     const Eigen::Vector3d axis = a.unitOrthogonal();
     return 2.0 * axis * axis.transpose() - Eigen::Matrix3d::Identity();
   }
-  const double s = std::sqrt((1.0 + c) * 2.0);
-  const Eigen::Vector3d v = a.cross(b) * (1.0 / s);
-  return Eigen::Quaterniond(s * 0.5, v.x(), v.y(), v.z()).toRotationMatrix();
+  const Eigen::Vector3d v = a.cross(b) / twice_cos;
+  return Eigen::Quaterniond(0.5 * twice_cos, v.x(), v.y(), v.z()).normalized().toRotationMatrix();
 }
 
 SO3 SO3::exp(const Tangent& omega) {

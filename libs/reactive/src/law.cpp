@@ -104,7 +104,7 @@ double Law::attract(const model::Model& model, const dynamics::Workspace& ws,
   const double rate =
       2.0 * desired.tail<3>().norm() + 0.5 / rotation_length * desired.head<3>().norm();
   inverse_.factor_relative(J_, relative_damping, 1e-6);
-  inverse_.apply(desired, u);
+  inverse_.apply(J_, desired, u);
   const double fastest = u.lpNorm<Eigen::Infinity>();
   if (fastest > params_.cruise_speed) u *= params_.cruise_speed / fastest;
   if (middle_.size() == 0) return rate;
@@ -112,7 +112,7 @@ double Law::attract(const model::Model& model, const dynamics::Workspace& ws,
   // Centring must not push the tip off its goal, so this projection is almost undamped.
   inverse_.damp_relative(projection_damping);
   const Eigen::Matrix<double, 6, 1> tip_motion = J_ * centring_;
-  inverse_.apply(tip_motion, scratch_);
+  inverse_.apply(J_, tip_motion, scratch_);
   u += centring_ - scratch_;
   return rate;
 }

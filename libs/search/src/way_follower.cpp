@@ -106,7 +106,7 @@ void WayFollower::lean(double share) {
   set_jacobian();
   step_ = std::min(1.0, lean_rate * share) * (bias_ - q_);
   const Eigen::Matrix<double, 6, 1> moved = J_ * step_;
-  inverse_.apply(moved, held_);
+  inverse_.apply(J_, moved, held_);
   step_ -= held_;
   q_ = (q_ + step_).cwiseMax(box_.lower).cwiseMin(box_.upper);
 }
@@ -123,7 +123,7 @@ bool WayFollower::reach(const geometry::SE3& target) {
     if (error.tail<3>().norm() < on_curve_share * tolerance_.m &&
         error.head<3>().norm() < rotation_length * on_curve_share * tolerance_.rad)
       return true;
-    inverse_.apply(error, step_);
+    inverse_.apply(J_, error, step_);
     const double largest = step_.lpNorm<Eigen::Infinity>();
     if (largest > reach_step) step_ *= reach_step / largest;
     q_ = (q_ + step_).cwiseMax(box_.lower).cwiseMin(box_.upper);

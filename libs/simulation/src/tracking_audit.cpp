@@ -118,7 +118,7 @@ bool TrackingAudit::solve(const scene::Goal& goal, const geometry::SE3& target) 
     dynamics::frame_jacobian(model_, ws_, model_.robot().tip.link, tip.p(), J_);
     J_.topRows<3>() *= goal.position_only ? 0.0 : ik_length;
     inverse_.factor(J_, ik_damping);
-    inverse_.apply(error, step_);
+    inverse_.apply(J_, error, step_);
     const double size = step_.norm();
     if (size > ik_step_max) step_ *= ik_step_max / size;
     q_ += step_;

@@ -11,7 +11,7 @@ namespace hamelin::dynamics {
 /// Nakamura, Hanafusa 1986). Its functions do not allocate.
 class DampedInverse {
  public:
-  /// @param J  6 × dof, kept by reference until the next call of factor
+  /// @param J  6 × dof
   /// @param damping  λ > 0, in the square of the units of J
   void factor(const Matrix6Xd& J, double damping);
   /// As factor, with a damping that is relative to the trace of J Jᵀ, which counts as at least
@@ -21,11 +21,11 @@ class DampedInverse {
   void damp_relative(double damping);
 
   /// The joint step Jᵀ (J Jᵀ + λ 1)⁻¹ e for an error e of the tip.
+  /// @param J  the Jacobian that was factored
   /// @param out  dof
-  void apply(const geometry::Vector6d& error, Eigen::VectorXd& out) const;
+  void apply(const Matrix6Xd& J, const geometry::Vector6d& error, Eigen::VectorXd& out) const;
 
  private:
-  const Matrix6Xd* J_ = nullptr;
   geometry::Matrix6d G_ = geometry::Matrix6d::Identity();
   Eigen::LLT<geometry::Matrix6d> factors_;
   double damping_ = 0.0, trace_ = 0.0;
