@@ -233,8 +233,8 @@ TEST_CASE("the rotation between two directions is the least one, opposite ones i
     CAPTURE(angle);
     const Eigen::Vector3d to(2.0 * std::sin(angle), 0.0, 2.0 * std::cos(angle));
     const Eigen::Matrix3d R = rotation_between(3.0 * z, to);
-    CHECK(gap(R * z, to.normalized()) < 1e-9);
-    CHECK(gap(R * R.transpose(), Eigen::Matrix3d::Identity()) < 1e-9);
+    CHECK((R * z - to.normalized()).norm() < 1e-9);
+    CHECK((R * R.transpose()).isIdentity(1e-9));
     CHECK(R.determinant() > 0.0);
     CHECK(SO3(R).log().norm() == Approx(angle).margin(1e-9));
   }
