@@ -128,8 +128,12 @@ def tasks(job):
 
 
 def wait_for(job, what, seconds=300):
+    """Waits until a job has ended: while a task is put into the queue again, it is not listed."""
     end = time.monotonic() + seconds
-    while tasks(job):
+    unlisted = 0
+    while unlisted < 15:
+        release(job)
+        unlisted = 0 if tasks(job) else unlisted + 1
         if time.monotonic() > end:
             sys.exit(f"{what}: job {job} does not end: {tasks(job)}")
         time.sleep(0.2)
@@ -178,7 +182,6 @@ def execute(study, shards):
     job = submit(script)
     killed = kill_some(f"sweep\0run\0{directory}", shards, 2.0, 0.3, lambda: bool(tasks(job)))
     requeued = requeue_some(job, shards, 2.0)
-    release(job)
     wait_for(job, f"{shards} shards")
     wait_for(submit(script), f"{shards} shards, submitted again")
     study.compare(
@@ -190,7 +193,7 @@ def time_limit(study):
     """A task whose time is nearly up ends its runs and queues itself again."""
     directory, script = study.plan("slurm-limit"), study.root / "slurm-limit.sbatch"
     call(
-        study.program, "sweep", "emit", directory, "--slurm", "--shards", 1, "--time", "1", "-o", script
+        study.program, "sweep", "emit", directory, "--slurm", "--shards", 1, "--time", "3", "-o", script
     )
     job = submit(script)
     for _ in range(100):
@@ -204,7 +207,6 @@ def time_limit(study):
         if time.monotonic() > end:
             sys.exit(f"the task has not queued itself again:\n{state}")
         time.sleep(0.2)
-    release(job)
     wait_for(job, "time limit", 400)
     study.compare("Slurm, a task that queued itself again before its time limit", directory)
 
