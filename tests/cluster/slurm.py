@@ -128,12 +128,8 @@ def tasks(job):
 
 
 def wait_for(job, what, seconds=300):
-    """Waits until a job has ended: while a task is put into the queue again, it is not listed."""
     end = time.monotonic() + seconds
-    unlisted = 0
-    while unlisted < 15:
-        release(job)
-        unlisted = 0 if tasks(job) else unlisted + 1
+    while tasks(job):
         if time.monotonic() > end:
             sys.exit(f"{what}: job {job} does not end: {tasks(job)}")
         time.sleep(0.2)
@@ -154,6 +150,7 @@ def requeue_some(job, seed, seconds):
 
 def release(job):
     """Lets tasks start that Slurm holds back for a while after they were requeued."""
+    time.sleep(2)  # within a second of its end, the node refuses to start the same task again
     for task, state in tasks(job):
         if state == "PENDING":
             subprocess.run(["scontrol", "update", f"JobId={job}_{task}", "StartTime=now"],
@@ -182,6 +179,7 @@ def execute(study, shards):
     job = submit(script)
     killed = kill_some(f"sweep\0run\0{directory}", shards, 2.0, 0.3, lambda: bool(tasks(job)))
     requeued = requeue_some(job, shards, 2.0)
+    release(job)
     wait_for(job, f"{shards} shards")
     wait_for(submit(script), f"{shards} shards, submitted again")
     study.compare(
@@ -207,6 +205,7 @@ def time_limit(study):
         if time.monotonic() > end:
             sys.exit(f"the task has not queued itself again:\n{state}")
         time.sleep(0.2)
+    release(job)
     wait_for(job, "time limit", 400)
     study.compare("Slurm, a task that queued itself again before its time limit", directory)
 

@@ -64,6 +64,18 @@ installs_all() {
 run setup --all
 expect "setup --all installs what check, cover, fuzz and packages need as well" installs_all
 
+# ---- What the demo installs is there, and nothing of the tests ----
+for tool in g++ cmake ninja ccache pkg-config git node npm; do stub "$tool" 0; done
+cat >"$work/stubs/dpkg-query" <<'STUB'
+#!/bin/sh
+for package; do :; done
+case "$package" in catch2 | pybind11-dev | python3-* | *mujoco* | *ompl* | *ipopt*) exit 1 ;; esac
+echo "install ok installed"
+STUB
+builds_demo() { ((code == 0)) && called 'cmake --build --preset demo'; }
+run build demo
+expect "build demo needs no packages of tests" builds_demo
+
 # ---- Everything is installed; the stubbed build provides the program of BUILD ----
 for tool in g++ cmake ninja ccache pkg-config git node npm clang man chromium; do stub "$tool" 0; done
 printf '#!/bin/sh\necho "install ok installed"\n' >"$work/stubs/dpkg-query"
@@ -109,10 +121,10 @@ builds_changed() {
 stub ctest 0
 run quick
 expect "quick builds and tests what changed" builds_changed
-builds_named() { called 'cmake --build --preset ci --target hamelin_scene_tests$'; }
-run quick scene
+builds_named() { called 'cmake --build --preset ci --target hamelin_scene_tests hamelin_plugin_hybrid_tests$'; }
+run quick scene hybrid
 expect "quick builds and tests what is named" builds_named
-refuses_unknown() { printed "^dev: 'no_such': is not a library or plugin with tests"; }
+refuses_unknown() { ((code == 2)) && ! called cmake && printed "^dev: 'no_such': is not a library or plugin with tests"; }
 run quick no_such
 expect "quick names what has no tests" refuses_unknown
 stub git 0

@@ -1,7 +1,6 @@
 #pragma once
 #include <CLI/CLI.hpp>
 #include <string>
-#include <vector>
 
 /// The commands of the program. A command registers itself where it is defined, so that the program
 /// has those whose sources it is built from (HAMELIN_COMMANDS in apps/hamelin/CMakeLists.txt).
@@ -21,7 +20,7 @@ struct RegisteredCommand {
 /// added hidden, and refuse to run.
 void add_commands(CLI::App& app, int& exit_code);
 
-/// What refuses a command that this build lacks; empty for any other name.
+/// The message for a command that this build lacks; empty for any other name.
 [[nodiscard]] std::string absence_of(const std::string& name);
 
 }  // namespace hamelin::app

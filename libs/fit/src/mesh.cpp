@@ -25,7 +25,7 @@ constexpr std::uintmax_t file_bytes_max = 1ULL << 30;
 
 // The functions of assimp that are used; it is loaded for the first mesh.
 struct Assimp {
-  SharedLibrary library{HAMELIN_ASSIMP_FILE, "reading a mesh"};
+  SharedLibrary library{HAMELIN_ASSIMP_FILE, "the reader of meshes"};
   HAMELIN_LOADED(library, aiCreatePropertyStore);
   HAMELIN_LOADED(library, aiSetImportPropertyInteger);
   HAMELIN_LOADED(library, aiReleasePropertyStore);

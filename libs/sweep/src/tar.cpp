@@ -17,7 +17,7 @@ namespace {
 
 // The functions of libarchive that are used; it is loaded for the first archive.
 struct Libarchive {
-  SharedLibrary library{HAMELIN_LIBARCHIVE_FILE, "packing a sweep"};
+  SharedLibrary library{HAMELIN_LIBARCHIVE_FILE, "an archive of a sweep"};
   HAMELIN_LOADED(library, archive_entry_filetype);
   HAMELIN_LOADED(library, archive_entry_free);
   HAMELIN_LOADED(library, archive_entry_hardlink);

@@ -3,8 +3,8 @@
 
 namespace hamelin {
 
-/// A library of others that is loaded when it is needed, so that programs that never need it start
-/// without it. It stays loaded until the process ends.
+/// A third-party library that is loaded when it is needed, so that programs that never need it
+/// start without it. It stays loaded until the process ends.
 class SharedLibrary {
  public:
   /// @param file  name of the file, which the dynamic linker searches for: "libassimp.so.5"
