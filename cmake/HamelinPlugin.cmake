@@ -42,6 +42,7 @@ function(hamelin_plugin)
     set_target_properties(${target} PROPERTIES
       LIBRARY_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/lib/hamelin/test_plugins")
   else()
+    set_property(GLOBAL APPEND PROPERTY HAMELIN_PLUGINS ${target})
     install(TARGETS ${target} LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}/hamelin/plugins")
   endif()
 endfunction()

@@ -5,7 +5,7 @@ set -u
 export LC_ALL=C.UTF-8
 cd "$1" || exit 1
 shopt -s nullglob globstar
-pages=(README.md CONTRIBUTING.md CHANGELOG.md data/README.md docs/**/*.md libs/**/README.md plugins/*/README.md
+pages=(README.md CONTRIBUTING.md CHANGELOG.md data/README.md examples/README.md docs/**/*.md libs/**/README.md plugins/*/README.md
   tests/**/README.md)
 
 # Text outside of code blocks.

@@ -26,6 +26,8 @@ except ImportError:  # before Python 3.11
     from pip._vendor import tomli as tomllib  # type: ignore
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
+# The program's commands in a wheel. What the others do, the package does as functions.
+COMMANDS = ("run", "replay", "report", "plan", "scene", "plugins", "schema", "help")
 
 
 def _project() -> dict:
@@ -73,6 +75,9 @@ def _install(stage: pathlib.Path, settings: dict) -> None:
             "-DCMAKE_BUILD_TYPE=Release",
             "-DHAMELIN_BUILD_TESTS=OFF",
             "-DHAMELIN_BUILD_PYTHON=ON",
+            "-DHAMELIN_BUILD_C_INTERFACE=OFF",
+            "-DHAMELIN_COMMANDS=" + ";".join(COMMANDS),
+            "-DHAMELIN_INSTRUCTION_SETS=baseline;best",
             f"-DPython3_EXECUTABLE={sys.executable}",
             f"-DHAMELIN_PYTHON_DIR={_package_folder()}",
             "-DCMAKE_INSTALL_LIBDIR=lib",
@@ -80,8 +85,11 @@ def _install(stage: pathlib.Path, settings: dict) -> None:
         ]
         generator = ["-G", "Ninja"] if shutil.which("ninja") else []
         subprocess.run(["cmake", "-S", ROOT, "-B", build, *generator, *arguments], check=True)
-        subprocess.run(["cmake", "--build", build, "--parallel"], check=True)
-    subprocess.run(["cmake", "--install", build, "--prefix", stage], check=True)
+        build_wheel = ["cmake", "--build", build, "--parallel", "--target", "wheel"]
+        subprocess.run(build_wheel, check=True)
+    for component in ("python3-hamelin", "hamelin", "hamelin-plugins"):
+        install = ["cmake", "--install", build, "--prefix", stage, "--component", component]
+        subprocess.run(install, check=True)
 
 
 def _only_folder(stage: pathlib.Path, pattern: str, what: str) -> pathlib.Path:
