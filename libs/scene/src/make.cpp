@@ -96,8 +96,8 @@ class Marker {
     }
   }
 
-  // @param above the primitives that may overlap the cell @param here receives those that overlap
-  // it
+  // @param above the primitives that may overlap the cell
+  // @param here receives those that do
   BtNode state_of(const Cell& cell, const std::vector<std::size_t>& above,
                   std::vector<std::size_t>& here) {
     if (++examined_ > examined_max)
