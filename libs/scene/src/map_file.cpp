@@ -87,70 +87,110 @@ struct StatedHeader {
   int size_line = 0;
 };
 
-StatedHeader read_header(std::string_view bytes, const std::string& where) {
-  StatedHeader stated;
-  auto& header = stated.header;
-  header.format = format_of(bytes, where);
-  const auto ending = std::filesystem::path(where).extension();
-  if ((ending == ".bt" && header.format == MapFormat::ot) ||
-      (ending == ".ot" && header.format == MapFormat::bt))
-    refuse(where, "header line 1",
-           fmt::format("belongs to the other format, expected '{}' in a {} file",
-                       ending == ".bt" ? first_line_bt : first_line_ot, ending.string()));
-  bool has_id = false, has_size = false, has_resolution = false;
-  std::size_t at = bytes.find('\n') + 1;
-  for (int number = 2;; ++number) {
-    const std::string place = fmt::format("header line {}", number);
+// Reads the lines between the first one and the line 'data'.
+class HeaderReader {
+ public:
+  HeaderReader(std::string_view bytes, const std::string& where) : bytes_(bytes), where_(where) {}
+
+  StatedHeader read() {
+    MapHeader& header = stated_.header;
+    header.format = format_of(bytes_, where_);
+    check_ending();
+    at_ = bytes_.find('\n') + 1;
+    for (number_ = 2;; ++number_) {
+      const std::string_view line = next_line();
+      if (line == "data") break;
+      if (line.empty() || line.front() == '#') continue;
+      if (line.back() == '\r') fail("ends in CR LF, expected LF: the file was transferred as text");
+      take(line);
+    }
+    const char* missing = !has_id_           ? "id"
+                          : !has_size_       ? "size"
+                          : !has_resolution_ ? "res"
+                                             : nullptr;
+    if (missing != nullptr)
+      refuse(where_, "header", fmt::format("the line '{}' is missing", missing));
+    header.data_offset = at_;
+    return stated_;
+  }
+
+ private:
+  void check_ending() const {
+    const MapFormat format = stated_.header.format;
+    const auto ending = std::filesystem::path(where_).extension();
+    if ((ending == ".bt" && format == MapFormat::ot) ||
+        (ending == ".ot" && format == MapFormat::bt))
+      refuse(where_, "header line 1",
+             fmt::format("belongs to the other format, expected '{}' in a {} file",
+                         ending == ".bt" ? first_line_bt : first_line_ot, ending.string()));
+  }
+
+  std::string_view next_line() {
     const std::size_t end =
-        at == 0 || at >= bytes.size() ? std::string_view::npos : bytes.find('\n', at);
-    if (end == std::string_view::npos) refuse(where, place, "the file ends before the line 'data'");
-    const std::string_view line = bytes.substr(at, end - at);
-    at = end + 1;
-    if (line == "data") break;
-    if (line.empty() || line.front() == '#') continue;
-    if (line.back() == '\r')
-      refuse(where, place, "ends in CR LF, expected LF: the file was transferred as text");
+        at_ == 0 || at_ >= bytes_.size() ? std::string_view::npos : bytes_.find('\n', at_);
+    if (end == std::string_view::npos) fail("the file ends before the line 'data'");
+    const std::string_view line = bytes_.substr(at_, end - at_);
+    at_ = end + 1;
+    return line;
+  }
+
+  void take(std::string_view line) {
     const std::size_t space = line.find(' ');
     const std::string_view key = line.substr(0, space);
     const std::string_view value =
         space == std::string_view::npos ? std::string_view{} : line.substr(space + 1);
     const auto once = [&](bool& seen) {
-      if (seen) refuse(where, place, fmt::format("'{}' is given twice", key));
+      if (seen) fail(fmt::format("'{}' is given twice", key));
       seen = true;
     };
     if (key == "id") {
-      once(has_id);
-      header.colored = value == "ColorOcTree";
-      if (value != "OcTree" && !header.colored)
-        refuse(where, place,
-               fmt::format("tree type '{}' is not known, expected OcTree or ColorOcTree",
-                           printable(value)));
+      once(has_id_);
+      take_id(value);
     } else if (key == "size") {
-      once(has_size);
-      stated.size_line = number;
-      if (!parse_number(value, header.node_count))
-        refuse(where, place,
-               fmt::format("size '{}' is not a node count, expected an integer", printable(value)));
-      if (header.node_count == 0)
-        refuse(where, place, "size 0: the map has no nodes, expected at least one");
+      once(has_size_);
+      take_size(value);
     } else if (key == "res") {
-      once(has_resolution);
-      if (!parse_number(value, header.resolution))
-        refuse(where, place, fmt::format("res '{}' is not a number", printable(value)));
-      if (!(header.resolution >= resolution_min && header.resolution <= resolution_max))
-        refuse(where, place,
-               fmt::format("res '{}' is out of range, expected {} to {}", printable(value),
-                           resolution_min, resolution_max));
+      once(has_resolution_);
+      take_resolution(value);
     } else {
-      refuse(where, place,
-             fmt::format("'{}' is not known, expected id, size, res or data", printable(line)));
+      fail(fmt::format("'{}' is not known, expected id, size, res or data", printable(line)));
     }
   }
-  const char* missing = !has_id ? "id" : !has_size ? "size" : !has_resolution ? "res" : nullptr;
-  if (missing != nullptr) refuse(where, "header", fmt::format("the line '{}' is missing", missing));
-  header.data_offset = at;
-  return stated;
-}
+
+  void take_id(std::string_view value) {
+    stated_.header.colored = value == "ColorOcTree";
+    if (value != "OcTree" && !stated_.header.colored)
+      fail(fmt::format("tree type '{}' is not known, expected OcTree or ColorOcTree",
+                       printable(value)));
+  }
+
+  void take_size(std::string_view value) {
+    stated_.size_line = number_;
+    if (!parse_number(value, stated_.header.node_count))
+      fail(fmt::format("size '{}' is not a node count, expected an integer", printable(value)));
+    if (stated_.header.node_count == 0) fail("size 0: the map has no nodes, expected at least one");
+  }
+
+  void take_resolution(std::string_view value) {
+    double& resolution = stated_.header.resolution;
+    if (!parse_number(value, resolution))
+      fail(fmt::format("res '{}' is not a number", printable(value)));
+    if (!(resolution >= resolution_min && resolution <= resolution_max))
+      fail(fmt::format("res '{}' is out of range, expected {} to {}", printable(value),
+                       resolution_min, resolution_max));
+  }
+
+  [[noreturn]] void fail(const std::string& message) const {
+    refuse(where_, fmt::format("header line {}", number_), message);
+  }
+
+  std::string_view bytes_;
+  const std::string& where_;
+  StatedHeader stated_;
+  std::size_t at_ = 0;
+  int number_ = 2;
+  bool has_id_ = false, has_size_ = false, has_resolution_ = false;
+};
 
 enum class CellState { unknown, free, occupied };
 
@@ -322,7 +362,7 @@ void warn(MapData& map) {
 }  // namespace
 
 MapHeader check_map_bytes(std::string_view bytes, const std::string& where) {
-  const StatedHeader stated = read_header(bytes, where);
+  const StatedHeader stated = HeaderReader(bytes, where).read();
   check_count(stated, Body(bytes, stated.header, 0.0F, where).walk([](CellState, const Cell&) {}),
               where);
   return stated.header;
@@ -338,7 +378,7 @@ MapData map_from_bytes(std::string_view bytes, const std::string& where,
   if (!(options.occupancy_threshold > 0.0 && options.occupancy_threshold < 1.0))
     invalid(fmt::format("occupancy threshold {} is not allowed, expected above 0 and below 1",
                         options.occupancy_threshold));
-  const StatedHeader stated = read_header(bytes, where);
+  const StatedHeader stated = HeaderReader(bytes, where).read();
   const MapHeader& header = stated.header;
   Body body(bytes, header, log_odds_of(options.occupancy_threshold), where);
   // The first pass checks and counts: a bad file allocates nothing, and a good one exactly what it
