@@ -2,17 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
 #include "bt_writer.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/rng.hpp"
-#include "hamelin/description/robot_io.hpp"
-#include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/scene/scene.hpp"
 
@@ -83,15 +78,63 @@ bool contains(const Obstacle& o, const Box& box) {
   return true;
 }
 
-Eigen::Matrix3d random_rotation(Rng& rng) {
-  // Uniform quaternions: K. Shoemake, Uniform random rotations, Graphics Gems III, 1992.
-  const double u = rng.uniform(), a = 2.0 * std::numbers::pi * rng.uniform(),
-               b = 2.0 * std::numbers::pi * rng.uniform();
-  return Eigen::Quaterniond(std::sqrt(u) * std::cos(b), std::sqrt(1.0 - u) * std::sin(a),
-                            std::sqrt(1.0 - u) * std::cos(a), std::sqrt(u) * std::sin(b))
-      .normalized()
-      .toRotationMatrix();
-}
+// Tells which cells of a map the primitives mark.
+class Marker {
+ public:
+  Marker(const MakeMapOptions& options, const std::vector<Obstacle>& primitives)
+      : options_(options), primitives_(primitives) {
+    const double resolution = options.resolution_m;
+    if (options.free_bounds) free_ = voxel_range(*options.free_bounds, resolution, 0.5);
+    for (const Obstacle& o : primitives) {
+      check(o, fmt::format("primitive '{}'", o.name));
+      const Eigen::Vector3d center = o.pose.p();
+      Eigen::Vector3d reach;
+      for (int axis = 0; axis < 3; ++axis)
+        reach[axis] = half_extent(o, Eigen::Vector3d::Unit(axis));
+      if (options.mark == Mark::touch) reach.array() += 0.5 * resolution;
+      ranges_.push_back(voxel_range({center - reach, center + reach}, resolution, 0.5));
+    }
+  }
+
+  // @param above the primitives that may overlap the cell
+  // @param here receives those that do
+  BtNode state_of(const Cell& cell, const std::vector<std::size_t>& above,
+                  std::vector<std::size_t>& here) {
+    if (++examined_ > examined_max)
+      throw Error(ErrorCode::invalid,
+                  fmt::format("more than {} cells to examine: the resolution {} m is too fine for "
+                              "the primitives and free bounds",
+                              examined_max, options_.resolution_m));
+    const Box cube = to_metres(cell, options_.resolution_m);
+    // By rounding, a primitive may just touch a voxel, but not the wide cell around it: wide cells
+    // are enlarged by this.
+    const double margin = 1e-3 * options_.resolution_m;
+    for (const std::size_t i : above) {
+      const Obstacle& o = primitives_[i];
+      if (!overlaps(ranges_[i], cell)) continue;
+      if (cell.size == 1) {
+        const bool marked = options_.mark == Mark::touch
+                                ? touches(o, cube)
+                                : closest_on(o, o.pose, 0.5 * (cube.lo + cube.hi)).distance <= 0.0;
+        if (marked) return BtNode::occupied;
+      } else if (touches(o, {cube.lo.array() - margin, cube.hi.array() + margin})) {
+        if (contains(ranges_[i], cell) && contains(o, cube)) return BtNode::occupied;
+        here.push_back(i);
+      }
+    }
+    if (!here.empty()) return BtNode::parts;
+    return !overlaps(free_, cell)  ? BtNode::unknown
+           : contains(free_, cell) ? BtNode::free
+                                   : BtNode::parts;
+  }
+
+ private:
+  const MakeMapOptions& options_;
+  const std::vector<Obstacle>& primitives_;
+  VoxelBox free_;
+  std::vector<VoxelBox> ranges_;
+  std::size_t examined_ = 0;
+};
 
 Eigen::Vector3d vector_from(const Json& value) {
   return {value.at(0).get<double>(), value.at(1).get<double>(), value.at(2).get<double>()};
@@ -116,44 +159,6 @@ Mark mark_from(std::string_view name) {
   if (name == "centre") return Mark::centre;
   throw Error(ErrorCode::usage,
               fmt::format("mark '{}' is not known, expected touch or centre", name));
-}
-
-std::vector<Obstacle> make_clutter(const Clutter& clutter) {
-  if (!(clutter.size_min_m > 0.0 && clutter.size_min_m <= clutter.size_max_m))
-    throw Error(ErrorCode::invalid,
-                fmt::format("clutter sizes {} to {} m, expected 0 < size_min_m <= size_max_m",
-                            clutter.size_min_m, clutter.size_max_m));
-  Rng rng(clutter.seed);
-  const auto size = [&] { return rng.uniform(clutter.size_min_m, clutter.size_max_m); };
-  std::vector<Obstacle> made;
-  const std::size_t tries_max = 1000 * (clutter.count + 1);
-  for (std::size_t tries = 0; made.size() < clutter.count; ++tries) {
-    if (tries == tries_max)
-      throw Error(
-          ErrorCode::invalid,
-          fmt::format(
-              "clutter: only {} of {} primitives placed in {} tries, expected more room outside "
-              "the keep-out balls",
-              made.size(), clutter.count, tries_max));
-    Obstacle o;
-    o.name = fmt::format("clutter{}", made.size());
-    o.shape = static_cast<Shape>(rng.below(3));
-    // Every primitive draws the same random numbers for every shape.
-    const double a = size(), b = size(), c = size();
-    o.size_m = {a, b, c};
-    o.radius_m = 0.5 * a;
-    o.length_m = b;
-    Eigen::Vector3d center;
-    for (Eigen::Index axis = 0; axis < 3; ++axis)
-      center[axis] = rng.uniform(clutter.bounds.lo[axis], clutter.bounds.hi[axis]);
-    o.pose = {random_rotation(rng), center};
-    const bool clear =
-        std::all_of(clutter.keep_out.begin(), clutter.keep_out.end(), [&](const Ball& ball) {
-          return closest_on(o, o.pose, ball.center).distance >= ball.radius;
-        });
-    if (clear) made.push_back(o);
-  }
-  return made;
 }
 
 bool touches(const Obstacle& primitive, const Box& cube) {
@@ -188,50 +193,13 @@ MakeReport make_map(const MakeMapOptions& options) {
   }
   MakeReport report;
   report.primitives = primitives.size();
-  VoxelBox free;
-  if (options.free_bounds) free = voxel_range(*options.free_bounds, resolution, 0.5);
-  std::vector<VoxelBox> ranges;
-  for (const Obstacle& o : primitives) {
-    check(o, fmt::format("primitive '{}'", o.name));
-    const Eigen::Vector3d center = o.pose.p();
-    Eigen::Vector3d reach;
-    for (int axis = 0; axis < 3; ++axis) reach[axis] = half_extent(o, Eigen::Vector3d::Unit(axis));
-    if (options.mark == Mark::touch) reach.array() += 0.5 * resolution;
-    ranges.push_back(voxel_range({center - reach, center + reach}, resolution, 0.5));
-  }
-  // By rounding, a primitive may just touch a voxel, but not the wide cell around it: wide cells
-  // are enlarged by this.
-  const double margin = 1e-3 * resolution;
+  Marker marker(options, primitives);
   // From wide cells to narrow ones, each with the primitives that may overlap it.
   std::vector<std::size_t> all(primitives.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
-  std::size_t examined = 0;
-  const BtWriter writer(all, [&](const Cell& cell, const std::vector<std::size_t>& above,
-                                 std::vector<std::size_t>& here) {
-    if (++examined > examined_max)
-      throw Error(ErrorCode::invalid,
-                  fmt::format("more than {} cells to examine: the resolution {} m is too fine for "
-                              "the primitives and free bounds",
-                              examined_max, resolution));
-    const Box cube = to_metres(cell, resolution);
-    for (const std::size_t i : above) {
-      const Obstacle& o = primitives[i];
-      if (!overlaps(ranges[i], cell)) continue;
-      if (cell.size == 1) {
-        const bool marked = options.mark == Mark::touch
-                                ? touches(o, cube)
-                                : closest_on(o, o.pose, 0.5 * (cube.lo + cube.hi)).distance <= 0.0;
-        if (marked) return BtNode::occupied;
-      } else if (touches(o, {cube.lo.array() - margin, cube.hi.array() + margin})) {
-        if (contains(ranges[i], cell) && contains(o, cube)) return BtNode::occupied;
-        here.push_back(i);
-      }
-    }
-    if (!here.empty()) return BtNode::parts;
-    return !overlaps(free, cell)  ? BtNode::unknown
-           : contains(free, cell) ? BtNode::free
-                                  : BtNode::parts;
-  });
+  const BtWriter writer(
+      all, [&](const Cell& cell, const std::vector<std::size_t>& above,
+               std::vector<std::size_t>& here) { return marker.state_of(cell, above, here); });
   if (writer.nodes() == 0)
     throw Error(ErrorCode::invalid,
                 "the map would be empty, expected primitives, clutter or free bounds");
@@ -276,194 +244,6 @@ MakeMapOptions make_options_from_json(const Json& document, const std::string& w
     options.clutter = clutter;
   }
   return options;
-}
-
-namespace {
-
-// How far beyond the arm's reach the map of a problem has free space [m]: farther than a planner's
-// queries.
-constexpr double free_margin_m = 0.5;
-// The faces of the free space are multiples of this many voxels, so that few nodes describe it.
-constexpr double free_grain = 16.0;
-
-// Reads the keys of a problem. Each message names the key.
-class ProblemReader {
- public:
-  ProblemReader(const Json& document, std::string where)
-      : document_(document), where_(std::move(where)) {
-    if (!document.is_object())
-      fail("", "is not an object, expected a problem with start, goal and obstacles");
-    if (const Json* units = find(document, "units"); units != nullptr && *units != "m,rad")
-      fail("/units", fmt::format("are {}, expected \"m,rad\"", units->dump()));
-  }
-
-  [[nodiscard]] std::vector<double> joints(const char* key, int dof) const {
-    const std::string place = fmt::format("/{}", key);
-    const Json* value = find(document_, key);
-    if (value == nullptr)
-      fail(place, fmt::format("is missing, expected {} numbers (one per joint)", dof));
-    return numbers(*value, place, static_cast<std::size_t>(dof));
-  }
-
-  [[nodiscard]] Json obstacles() const {
-    const Json* list = find(document_, "obstacles");
-    if (list == nullptr || !list->is_array())
-      fail("/obstacles", "is missing, expected a list of primitives");
-    Json out = Json::array();
-    for (std::size_t i = 0; i < list->size(); ++i)
-      out.push_back(obstacle((*list)[i], fmt::format("/obstacles/{}", i)));
-    return out;
-  }
-
-  [[noreturn]] void fail(const std::string& place, const std::string& message) const {
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: {}: {}", where_, place.empty() ? "/" : place, message));
-  }
-
- private:
-  static const Json* find(const Json& object, const char* key) {
-    const auto it = object.find(key);
-    return it == object.end() || it->is_null() ? nullptr : &*it;
-  }
-
-  [[nodiscard]] std::vector<double> numbers(const Json& value, const std::string& place,
-                                            std::size_t count) const {
-    if (!value.is_array() || value.size() != count ||
-        !std::all_of(value.begin(), value.end(), [](const Json& x) { return x.is_number(); }))
-      fail(place, fmt::format("is {}, expected {} numbers", brief(value), count));
-    return value.get<std::vector<double>>();
-  }
-
-  static std::string brief(const Json& value) {
-    if (value.is_array()) return fmt::format("a list of {}", value.size());
-    if (value.is_object()) return "an object";
-    const std::string text = value.dump();
-    return text.size() > 40 ? text.substr(0, 40) + "..." : text;
-  }
-
-  // In the format of a scene.
-  [[nodiscard]] Json obstacle(const Json& from, const std::string& place) const {
-    if (!from.is_object()) fail(place, fmt::format("is {}, expected a primitive", brief(from)));
-    const Json* type = find(from, "type");
-    const Json given = type != nullptr ? *type : Json(nullptr);
-    const bool box = given == "box", sphere = given == "sphere", cylinder = given == "cylinder";
-    if (!box && !sphere && !cylinder)
-      fail(place + "/type",
-           fmt::format("is {}, expected \"sphere\", \"box\" or \"cylinder\"", brief(given)));
-    Json out{{"name", ""}, {"type", given}};
-    const auto length = [&](const Json& value, const std::string& at) {
-      if (!value.is_number() || !(value.get<double>() > 0.0 && std::isfinite(value.get<double>())))
-        fail(at, fmt::format("is {}, expected a length above 0", brief(value)));
-    };
-    bool placed = false;
-    for (const auto& [key, value] : from.items()) {
-      const std::string at = fmt::format("{}/{}", place, key);
-      if (key == "type") continue;
-      if (key == "name") {
-        if (!value.is_string()) fail(at, fmt::format("is {}, expected a name", brief(value)));
-        out["name"] = value;
-      } else if (key == "position") {
-        out["position_m"] = numbers(value, at, 3);
-        placed = true;
-      } else if (key == "quaternion_wxyz") {
-        out["quaternion_wxyz"] = numbers(value, at, 4);
-      } else if (key == "size" && box) {
-        for (const double edge : numbers(value, at, 3)) length(edge, at);
-        out["size_m"] = value;
-      } else if ((key == "radius" && !box) || (key == "length" && cylinder)) {
-        length(value, at);
-        out[key + "_m"] = value;
-      } else {
-        fail(at, fmt::format("is not known, a {} has name, type, position, quaternion_wxyz and {}",
-                             given.get<std::string>(),
-                             box      ? "size"
-                             : sphere ? "radius"
-                                      : "radius, length"));
-      }
-    }
-    if (!placed) fail(place + "/position", "is missing, expected 3 numbers");
-    for (const char* needed : {box ? "size" : "radius", cylinder ? "length" : "type"})
-      if (find(from, needed) == nullptr)
-        fail(fmt::format("{}/{}", place, needed),
-             fmt::format("is missing, expected for a {}", given.get<std::string>()));
-    out["judge_only"] = true;
-    return out;
-  }
-
-  const Json& document_;
-  std::string where_;
-};
-
-// The problem's goal in the format of a scene.
-Json goal_json(const std::vector<double>& q, GoalType type, const model::Model& model) {
-  if (type == GoalType::joint) return {{"type", "joint"}, {"q", q}};
-  dynamics::Workspace ws(model);
-  dynamics::forward_kinematics(
-      model, ws, Eigen::Map<const Eigen::VectorXd>(q.data(), static_cast<Eigen::Index>(q.size())));
-  const geometry::SE3 tip = dynamics::tip_pose(model, ws);
-  Json goal{{"type", to_string(type)}, {"position_m", {tip.p().x(), tip.p().y(), tip.p().z()}}};
-  if (type == GoalType::pose) {
-    const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(tip.R());
-    goal["quaternion_wxyz"] = {wxyz[0], wxyz[1], wxyz[2], wxyz[3]};
-  }
-  return goal;
-}
-
-// The cube around the base that contains everything that the arm can come near. The space of a
-// problem is known.
-Box free_space(const model::Model& model, double resolution) {
-  const double grain = free_grain * resolution;
-  const double half = grain * std::ceil((model.reach() + free_margin_m) / grain);
-  return {Eigen::Vector3d::Constant(-half), Eigen::Vector3d::Constant(half)};
-}
-
-}  // namespace
-
-MakeReport make_scene_from_problem(const std::filesystem::path& problem,
-                                   const ProblemOptions& options) {
-  const Json document = read_json(problem);
-  const ProblemReader in(document, problem.string());
-  const auto directory = options.output.parent_path();
-  const auto relative = [&](const std::filesystem::path& path) {
-    return std::filesystem::proximate(path, directory.empty() ? "." : directory).generic_string();
-  };
-  description::RobotOptions of_robot;
-  if (!options.tip.empty()) of_robot.tip = options.tip;
-  if (!options.spheres.empty()) of_robot.spheres = options.spheres;
-  const model::Model model(description::read_robot(options.robot, of_robot));
-  MakeMapOptions map;
-  map.resolution_m = options.resolution_m;
-  map.mark = options.mark;
-  map.output = options.output;
-  map.output.replace_extension(".bt");
-  if (map.output == options.output)
-    throw Error(
-        ErrorCode::invalid,
-        fmt::format("{}: is the name of the map, expected that of a scene, such as {}",
-                    options.output.string(),
-                    std::filesystem::path(options.output).replace_extension(".json").string()));
-  Json out{{"schema", "hamelin.scene/1"}};
-  out["robot"] = {{"file", relative(options.robot)}};
-  if (!options.tip.empty()) out["robot"]["tip"] = options.tip;
-  if (!options.spheres.empty()) out["robot"]["spheres"] = relative(options.spheres);
-  out["gravity_m_s2"] = {0.0, 0.0, -9.81};
-  out["start"] = {{"q", in.joints("start", model.dof())}};
-  out["goals"] = Json::array({goal_json(in.joints("goal", model.dof()), options.goal, model)});
-  out["map"] = {{"file", map.output.filename().string()}};
-  out["obstacles"] = in.obstacles();
-  out["model"] = {{"joint_limits", true},
-                  {"velocity_limits", true},
-                  {"torque_limits", true},
-                  {"self_collision", true}};
-  out["planner"] = {{"name", "hybrid"}};
-  out["step_s"] = 0.001;
-  out["duration_s"] = 30.0;
-  out["seed"] = 1;
-  map.primitives = scene_from_json(out, directory, problem.string()).obstacles;
-  map.free_bounds = free_space(model, map.resolution_m);
-  MakeReport report = make_map(map);
-  write_file_atomically(options.output, out.dump(2) + "\n");
-  return report;
 }
 
 }  // namespace hamelin::scene

@@ -60,10 +60,7 @@ void check_region(const CropOptions& options) {
   }
 }
 
-}  // namespace
-
-CropReport crop_map(const CropOptions& options) {
-  check_region(options);
+void check_output(const CropOptions& options) {
   std::error_code ignored;
   if (std::filesystem::equivalent(options.map, options.output, ignored))
     throw Error(ErrorCode::invalid,
@@ -73,6 +70,35 @@ CropReport crop_map(const CropOptions& options) {
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: expected a name that ends in .bt, the format written",
                             options.output.string()));
+}
+
+// @param leaves in the order of the file
+BtWriter writer_of(const std::vector<Leaf>& leaves) {
+  struct Range {
+    std::size_t begin = 0, end = 0;
+  };
+  return BtWriter(Range{0, leaves.size()}, [&](const Cell& cell, const Range& above, Range& here) {
+    const auto edge = static_cast<std::uint64_t>(cell.size);
+    const std::uint64_t first = morton_code(cell), last = first + edge * edge * edge;
+    const auto at = [&](std::uint64_t code, std::size_t from) {
+      const auto begin = leaves.begin();
+      const auto found = std::lower_bound(
+          begin + static_cast<std::ptrdiff_t>(from), begin + static_cast<std::ptrdiff_t>(above.end),
+          code, [](const Leaf& leaf, std::uint64_t c) { return leaf.code < c; });
+      return static_cast<std::size_t>(found - begin);
+    };
+    here.begin = at(first, above.begin);
+    here.end = at(last, here.begin);
+    if (here.begin == here.end) return BtNode::unknown;
+    return leaves[here.begin].size == cell.size ? leaves[here.begin].node : BtNode::parts;
+  });
+}
+
+}  // namespace
+
+CropReport crop_map(const CropOptions& options) {
+  check_region(options);
+  check_output(options);
   const std::string bytes = read_file(options.map);
   ReadMapOptions read = options.read;
   read.keep_free = true;
@@ -91,26 +117,7 @@ CropReport crop_map(const CropOptions& options) {
                                                 options.map.string()));
   std::sort(leaves.begin(), leaves.end(),
             [](const Leaf& a, const Leaf& b) { return a.code < b.code; });
-
-  struct Range {
-    std::size_t begin = 0, end = 0;
-  };
-  const BtWriter writer(Range{0, leaves.size()}, [&](const Cell& cell, const Range& above,
-                                                     Range& here) {
-    const auto edge = static_cast<std::uint64_t>(cell.size);
-    const std::uint64_t first = morton_code(cell), last = first + edge * edge * edge;
-    const auto at = [&](std::uint64_t code, std::size_t from) {
-      const auto begin = leaves.begin();
-      const auto found = std::lower_bound(
-          begin + static_cast<std::ptrdiff_t>(from), begin + static_cast<std::ptrdiff_t>(above.end),
-          code, [](const Leaf& leaf, std::uint64_t c) { return leaf.code < c; });
-      return static_cast<std::size_t>(found - begin);
-    };
-    here.begin = at(first, above.begin);
-    here.end = at(last, here.begin);
-    if (here.begin == here.end) return BtNode::unknown;
-    return leaves[here.begin].size == cell.size ? leaves[here.begin].node : BtNode::parts;
-  });
+  const BtWriter writer = writer_of(leaves);
   const std::string out = writer.file(map.resolution, "cropped by hamelin");
   write_file_atomically(options.output, out);
   report.sha256 = sha256_hex(out);

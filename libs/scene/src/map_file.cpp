@@ -4,153 +4,19 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cmath>
-#include <cstring>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
+#include "map_header.hpp"
 
 namespace hamelin::scene {
 
 namespace {
 
 constexpr std::size_t max_depth = 16;
-constexpr std::string_view first_line_bt = "# Octomap OcTree binary file";
-constexpr std::string_view first_line_ot = "# Octomap OcTree file";
-constexpr double resolution_min = 1e-5, resolution_max = 1e4;
 // OctoMap clamps at ±3.5 by default. A log-odds of 100 is certainty to 43 digits.
 constexpr float log_odds_max = 100.0F;
-
-[[noreturn]] void refuse(const std::string& where, const std::string& place,
-                         const std::string& message) {
-  throw Error(ErrorCode::parse, fmt::format("{}: {}: {}", where, place, message));
-}
-
-// A short, printable form of arbitrary bytes.
-std::string printable(std::string_view text) {
-  std::string out;
-  for (const char c : text.substr(0, 40)) out += (c >= ' ' && c < '\x7f') ? c : '?';
-  return text.size() > 40 ? out + "..." : out;
-}
-
-// Files of the time before OctoMap had headers begin with the tree's type, 3, as four bytes, then
-// the resolution as a double.
-[[noreturn]] void refuse_legacy(std::string_view bytes, const std::string& where) {
-  constexpr std::size_t header_size = 4 + 8 + 4;
-  double resolution = 0.0;
-  std::uint32_t nodes = 0;
-  if (bytes.size() <= header_size)
-    refuse(where, "byte 0", "a truncated legacy file without header lines, expected an OctoMap");
-  std::memcpy(&resolution, bytes.data() + 4, sizeof resolution);
-  std::memcpy(&nodes, bytes.data() + 12, sizeof nodes);
-  if (!(resolution >= resolution_min && resolution <= resolution_max))
-    refuse(where, "byte 4",
-           fmt::format("a legacy file without header lines, of resolution {}, expected an OctoMap",
-                       resolution));
-  refuse(where, "byte 0",
-         fmt::format("a legacy file without header lines (resolution {}, {} nodes), expected '{}' "
-                     "or '{}': convert it "
-                     "with OctoMap's convert_octree",
-                     resolution, nodes, first_line_bt, first_line_ot));
-}
-
-MapFormat format_of(std::string_view bytes, const std::string& where) {
-  const auto starts = [&](std::string_view head) { return bytes.substr(0, head.size()) == head; };
-  if (bytes.empty()) refuse(where, "byte 0", "the file is empty, expected an OctoMap");
-  if (starts("\x1f\x8b"))
-    refuse(where, "byte 0", "gzip-compressed, expected an OctoMap: gunzip it first");
-  if (starts("version https://git-lfs"))
-    refuse(where, "byte 0", "a Git LFS pointer, expected an OctoMap: run 'git lfs pull' first");
-  if (starts(std::string_view("\3\0\0\0", 4))) refuse_legacy(bytes, where);
-  const std::string_view line = bytes.substr(0, bytes.find('\n'));
-  if (starts(first_line_bt) || starts(first_line_ot)) {
-    if (line.back() == '\r')
-      refuse(where, "header line 1",
-             "ends in CR LF, expected LF: the file was transferred as text");
-    if (line == first_line_bt) return MapFormat::bt;
-    if (line == first_line_ot) return MapFormat::ot;
-  }
-  refuse(
-      where, "header line 1",
-      fmt::format("is '{}', expected '{}' or '{}'", printable(line), first_line_bt, first_line_ot));
-}
-
-template <typename T>
-bool parse_number(std::string_view text, T& value) {
-  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
-  return result.ec == std::errc{} && result.ptr == text.data() + text.size();
-}
-
-struct StatedHeader {
-  MapHeader header;
-  int size_line = 0;
-};
-
-StatedHeader read_header(std::string_view bytes, const std::string& where) {
-  StatedHeader stated;
-  auto& header = stated.header;
-  header.format = format_of(bytes, where);
-  const auto ending = std::filesystem::path(where).extension();
-  if ((ending == ".bt" && header.format == MapFormat::ot) ||
-      (ending == ".ot" && header.format == MapFormat::bt))
-    refuse(where, "header line 1",
-           fmt::format("belongs to the other format, expected '{}' in a {} file",
-                       ending == ".bt" ? first_line_bt : first_line_ot, ending.string()));
-  bool has_id = false, has_size = false, has_resolution = false;
-  std::size_t at = bytes.find('\n') + 1;
-  for (int number = 2;; ++number) {
-    const std::string place = fmt::format("header line {}", number);
-    const std::size_t end =
-        at == 0 || at >= bytes.size() ? std::string_view::npos : bytes.find('\n', at);
-    if (end == std::string_view::npos) refuse(where, place, "the file ends before the line 'data'");
-    const std::string_view line = bytes.substr(at, end - at);
-    at = end + 1;
-    if (line == "data") break;
-    if (line.empty() || line.front() == '#') continue;
-    if (line.back() == '\r')
-      refuse(where, place, "ends in CR LF, expected LF: the file was transferred as text");
-    const std::size_t space = line.find(' ');
-    const std::string_view key = line.substr(0, space);
-    const std::string_view value =
-        space == std::string_view::npos ? std::string_view{} : line.substr(space + 1);
-    const auto once = [&](bool& seen) {
-      if (seen) refuse(where, place, fmt::format("'{}' is given twice", key));
-      seen = true;
-    };
-    if (key == "id") {
-      once(has_id);
-      header.colored = value == "ColorOcTree";
-      if (value != "OcTree" && !header.colored)
-        refuse(where, place,
-               fmt::format("tree type '{}' is not known, expected OcTree or ColorOcTree",
-                           printable(value)));
-    } else if (key == "size") {
-      once(has_size);
-      stated.size_line = number;
-      if (!parse_number(value, header.node_count))
-        refuse(where, place,
-               fmt::format("size '{}' is not a node count, expected an integer", printable(value)));
-      if (header.node_count == 0)
-        refuse(where, place, "size 0: the map has no nodes, expected at least one");
-    } else if (key == "res") {
-      once(has_resolution);
-      if (!parse_number(value, header.resolution))
-        refuse(where, place, fmt::format("res '{}' is not a number", printable(value)));
-      if (!(header.resolution >= resolution_min && header.resolution <= resolution_max))
-        refuse(where, place,
-               fmt::format("res '{}' is out of range, expected {} to {}", printable(value),
-                           resolution_min, resolution_max));
-    } else {
-      refuse(where, place,
-             fmt::format("'{}' is not known, expected id, size, res or data", printable(line)));
-    }
-  }
-  const char* missing = !has_id ? "id" : !has_size ? "size" : !has_resolution ? "res" : nullptr;
-  if (missing != nullptr) refuse(where, "header", fmt::format("the line '{}' is missing", missing));
-  header.data_offset = at;
-  return stated;
-}
 
 enum class CellState { unknown, free, occupied };
 
@@ -270,7 +136,7 @@ class Body {
   }
 
   [[noreturn]] void fail(std::size_t offset, const std::string& message) const {
-    refuse(where_, fmt::format("byte {}", offset), message);
+    refuse_map(where_, fmt::format("byte {}", offset), message);
   }
 
   static constexpr const char* too_deep = "the tree is deeper than 16 levels";
@@ -290,8 +156,8 @@ float log_odds_of(double probability) {
 
 void check_count(const StatedHeader& stated, std::size_t nodes, const std::string& where) {
   if (nodes != stated.header.node_count)
-    refuse(where, fmt::format("header line {}", stated.size_line),
-           fmt::format("size {}, but the file has {} nodes", stated.header.node_count, nodes));
+    refuse_map(where, fmt::format("header line {}", stated.size_line),
+               fmt::format("size {}, but the file has {} nodes", stated.header.node_count, nodes));
 }
 
 void warn(MapData& map) {
@@ -322,7 +188,7 @@ void warn(MapData& map) {
 }  // namespace
 
 MapHeader check_map_bytes(std::string_view bytes, const std::string& where) {
-  const StatedHeader stated = read_header(bytes, where);
+  const StatedHeader stated = read_map_header(bytes, where);
   check_count(stated, Body(bytes, stated.header, 0.0F, where).walk([](CellState, const Cell&) {}),
               where);
   return stated.header;
@@ -338,7 +204,7 @@ MapData map_from_bytes(std::string_view bytes, const std::string& where,
   if (!(options.occupancy_threshold > 0.0 && options.occupancy_threshold < 1.0))
     invalid(fmt::format("occupancy threshold {} is not allowed, expected above 0 and below 1",
                         options.occupancy_threshold));
-  const StatedHeader stated = read_header(bytes, where);
+  const StatedHeader stated = read_map_header(bytes, where);
   const MapHeader& header = stated.header;
   Body body(bytes, header, log_odds_of(options.occupancy_threshold), where);
   // The first pass checks and counts: a bad file allocates nothing, and a good one exactly what it

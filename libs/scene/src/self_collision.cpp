@@ -73,9 +73,15 @@ AxisPair nearest_on_axes(const Vector3d& center_a, const Vector3d& half_a, const
   return best;
 }
 
-SelfField::SelfField(const model::Model& model) : has_capsules_(model.has_capsules()) {
+SelfField::SelfField(const model::Model& model)
+    : has_capsules_(model.has_capsules() || !model.robot().base_segments.empty()) {
+  add_parts(model);
+  add_bounding_balls(model);
+  add_pairs(model.robot());
+}
+
+void SelfField::add_parts(const model::Model& model) {
   const model::Robot& robot = model.robot();
-  has_capsules_ = has_capsules_ || !robot.base_segments.empty();
   const auto part_named = [&](const std::string& name, int body) -> Part& {
     for (Part& part : parts_)
       if (part.name == name) return part;
@@ -105,6 +111,9 @@ SelfField::SelfField(const model::Model& model) : has_capsules_(model.has_capsul
   for (const auto& capsule : robot.base_segments)
     add_to_base(capsule.part, 0.5 * (capsule.from_m + capsule.to_m),
                 0.5 * (capsule.to_m - capsule.from_m), capsule.radius_m);
+}
+
+void SelfField::add_bounding_balls(const model::Model& model) {
   for (Part& part : parts_) {
     std::vector<Vector3d> centers;
     std::vector<double> radii;
@@ -116,7 +125,9 @@ SelfField::SelfField(const model::Model& model) : has_capsules_(model.has_capsul
     }
     set_bounding_ball(part, centers, radii);
   }
+}
 
+void SelfField::add_pairs(const model::Robot& robot) {
   std::set<std::pair<std::string, std::string>> disabled;
   for (const auto& [a, b] : robot.self_collision_disabled) {
     disabled.emplace(a, b);

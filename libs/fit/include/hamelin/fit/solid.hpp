@@ -2,11 +2,11 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <span>
+#include <optional>
 #include <vector>
 
 #include "hamelin/fit/mesh.hpp"
-#include "hamelin/fit/shape.hpp"
+#include "hamelin/fit/triangle_tree.hpp"
 
 namespace hamelin::fit {
 
@@ -39,42 +39,35 @@ class Solid {
   [[nodiscard]] double spacing() const noexcept { return spacing_; }  ///< of the grid [m]
   /// Whether each edge is passed equally often in both directions by the triangles around it.
   [[nodiscard]] bool closed() const noexcept { return closed_; }
-  [[nodiscard]] double volume() const;                          ///< [m³], docs/theory.md (13.39)
-  [[nodiscard]] double area() const noexcept { return area_; }  ///< [m²]
+  [[nodiscard]] double volume() const;  ///< [m³], docs/theory.md (13.39)
+  [[nodiscard]] double area() const noexcept { return outer_.area(); }  ///< [m²]
   /// The grid points inside, or within one grid step of the surface, as thin bodies need.
   [[nodiscard]] std::vector<Eigen::Vector3d> inner_points() const;
 
  private:
-  struct Node {
-    Eigen::Vector3d low, high;
-    Eigen::Vector3d center, normal;  ///< centroid by area; sum of area times normal
-    double radius = 0.0;             ///< of a ball about `center` that holds the triangles
-    /// A leaf has a count > 0. The left child of any other node is the next node.
-    std::int32_t first = 0, count = 0, right = 0;
-  };
   enum class Side : std::uint8_t { near, outside, inside };
 
-  void build_tree();
-  std::int32_t build(std::size_t first, std::size_t last);
-  void find_closed();
-  /// Removes from outer_ what is not visible from outside. @return whether anything was removed
-  [[nodiscard]] bool remove_hidden_triangles();
+  void fill_grid(std::size_t nodes);
+  /// The smallest spacing for at most so many points, margin included.
+  void place_grid(std::size_t nodes);
+  /// Distances without sign, and which points are clear of the surface. @return the nearest points
+  std::vector<Eigen::Vector3d> measure_distances();
+  /// Tells the clear points outside from those inside.
+  void find_outside();
+  /// Calls f(i, j, k) for each grid point.
+  template <class F>
+  void each_point(const F& f) const;
+  /// What of outer_ is visible from outside; none if all of it, or nothing, is.
+  [[nodiscard]] std::optional<Mesh> visible_part() const;
   /// The side of the nearest grid point that is clear of the surface and visible from p; `near` if
   /// there is none.
   [[nodiscard]] Side visible_side(const Eigen::Vector3d& p, bool outside_only) const;
-  [[nodiscard]] bool blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
-  void fill_grid(std::size_t nodes);
-  [[nodiscard]] Eigen::Vector3d closest(const Eigen::Vector3d& p, double within) const;
-  [[nodiscard]] double winding(const Eigen::Vector3d& p) const;
   [[nodiscard]] bool inside(const Eigen::Vector3d& p, const Eigen::Vector3d& nearest) const;
   [[nodiscard]] Eigen::Vector3d at(int i, int j, int k) const;
   [[nodiscard]] std::size_t index(int i, int j, int k) const;
 
   Mesh mesh_;
-  Mesh outer_;                       ///< the part visible from outside, perhaps cut smaller
-  std::vector<std::int32_t> order_;  ///< triangles in the order of the tree's leaves
-  std::vector<Node> tree_;
-  double area_ = 0.0;
+  TriangleTree outer_;  ///< the part visible from outside, perhaps cut smaller
   bool closed_ = false;
   double spacing_ = 0.0;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();

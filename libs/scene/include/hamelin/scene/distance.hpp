@@ -158,6 +158,8 @@ class BoxField {
                : -1;
   }
   void build_all();
+  /// One tree of the boxes that are left and of the added ones.
+  void rebuild(std::span<const Box> added);
   template <class From, class Hit>
   std::size_t nearest_distinct_of(const From& from, double limit, double cone_cosine,
                                   Scratch& scratch, std::span<Hit> out, Vicinity* vicinity) const;

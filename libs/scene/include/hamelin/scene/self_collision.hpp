@@ -65,6 +65,9 @@ class SelfField {
     double distance = 0.0;
     int a = 0, b = 0;
   };
+  void add_parts(const model::Model& model);
+  void add_bounding_balls(const model::Model& model);
+  void add_pairs(const model::Robot& robot);
   [[nodiscard]] const Eigen::Vector3d& center(int shape, const Shapes& arm) const {
     return shape >= 0 ? arm.centers[static_cast<std::size_t>(shape)]
                       : base_centers_[static_cast<std::size_t>(-1 - shape)];
