@@ -24,7 +24,7 @@ struct TickSelfContactRow {
 
 namespace {
 
-void copy3(const double (&from)[3], double (&to)[3]) {
+void copy_numbers(const double (&from)[3], double (&to)[3]) {
   std::memcpy(to, from, sizeof to);
 }
 
@@ -47,10 +47,10 @@ py::array_t<TickContactRow> tick_contacts(const PyTick& t) {
     row.link = t.links.at(static_cast<std::size_t>(from.shape));
     row.obstacle = from.obstacle;
     row.distance_m = from.distance_m;
-    copy3(from.arm_point_world_m, row.arm_point_m);
-    copy3(from.obstacle_point_world_m, row.obstacle_point_m);
-    copy3(from.direction_world, row.direction);
-    copy3(from.obstacle_velocity_world_m_s, row.obstacle_velocity_m_s);
+    copy_numbers(from.arm_point_world_m, row.arm_point_m);
+    copy_numbers(from.obstacle_point_world_m, row.obstacle_point_m);
+    copy_numbers(from.direction_world, row.direction);
+    copy_numbers(from.obstacle_velocity_world_m_s, row.obstacle_velocity_m_s);
   }
   return out;
 }
@@ -64,9 +64,9 @@ py::array_t<TickSelfContactRow> tick_self_contacts(const PyTick& t) {
     row.shape_a = from.shape_a;
     row.shape_b = from.shape_b;
     row.distance_m = from.distance_m;
-    copy3(from.point_a_world_m, row.point_a_m);
-    copy3(from.point_b_world_m, row.point_b_m);
-    copy3(from.direction_world, row.direction);
+    copy_numbers(from.point_a_world_m, row.point_a_m);
+    copy_numbers(from.point_b_world_m, row.point_b_m);
+    copy_numbers(from.direction_world, row.direction);
   }
   return out;
 }
