@@ -93,6 +93,16 @@ const Numbers& Numbers::require_rows(py::ssize_t columns) const {
   return *this;
 }
 
+FiniteRows::FiniteRows(std::string_view function, std::string_view argument, py::handle given,
+                       py::ssize_t columns)
+    : numbers_(function, argument, given), columns_(columns) {
+  if (single())
+    numbers_.require_vector(columns);
+  else
+    numbers_.require_rows(columns);
+  if (!numbers_.vector().allFinite()) refuse(function, argument, "is not finite");
+}
+
 Eigen::VectorXd vector_of(std::string_view function, std::string_view argument, py::handle given,
                           py::ssize_t size) {
   return Numbers(function, argument, given).require_vector(size).vector();

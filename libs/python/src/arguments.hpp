@@ -3,6 +3,7 @@
 #include <pybind11/pybind11.h>
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <filesystem>
 #include <initializer_list>
 #include <optional>
@@ -65,6 +66,30 @@ class Numbers {
   py::ssize_t dimensions_ = 0;
   const py::ssize_t* shape_ = nullptr;
   bool by_columns_ = false;
+};
+
+/// A vector of an argument, or several as the rows of an array, of finite numbers.
+class FiniteRows {
+ public:
+  /// @throws as Numbers; Error usage for another shape, or a number that is not finite
+  FiniteRows(std::string_view function, std::string_view argument, py::handle given,
+             py::ssize_t columns);
+
+  /// Whether it is one vector.
+  [[nodiscard]] bool single() const noexcept { return numbers_.dimensions() == 1; }
+  [[nodiscard]] py::ssize_t count() const noexcept { return single() ? 1 : numbers_.extent(0); }
+  [[nodiscard]] Eigen::Map<const Eigen::VectorXd> operator[](py::ssize_t i) const {
+    return {numbers_.data() + i * columns_, columns_};
+  }
+  /// One row after the other.
+  [[nodiscard]] std::span<const double> all() const noexcept {
+    return {numbers_.data(), static_cast<std::size_t>(numbers_.size())};
+  }
+  [[nodiscard]] py::array array() const { return numbers_.array(); }
+
+ private:
+  Numbers numbers_;
+  py::ssize_t columns_;
 };
 
 /// A vector of an argument. @throws as Numbers and Numbers::require_vector

@@ -382,12 +382,49 @@ py::tuple energy(BoundIntegrator& integrator, const PyState& state) {
   return py::make_tuple(energy.kinetic_J, energy.potential_J);
 }
 
+void kick(BoundIntegrator& integrator, PyState& state, py::handle dp) {
+  const Eigen::VectorXd impulse = vector_of("kick", "dp", dp, integrator.model->model.dof());
+  const Use use(integrator);
+  integrator.scheme->kick(state, impulse);
+}
+
+void set_velocity(BoundIntegrator& integrator, PyState& state, py::handle v) {
+  const Eigen::VectorXd value = vector_of("set_velocity", "v", v, integrator.model->model.dof());
+  const Use use(integrator);
+  integrator.scheme->set_velocity(state, value);
+}
+
+using IntegratorClass = py::class_<BoundIntegrator, std::shared_ptr<BoundIntegrator>>;
+
+void add_steps(IntegratorClass& type) {
+  using py::arg;
+  type.def("start", &start, arg("q0"), arg("v0") = py::none(),
+           "The state at time 0. q0, v0: shape (n,); v0 None: at rest.")
+      .def("step", &step, arg("state"), arg("step"), arg("channels") = py::none(),
+           "Advances the state by exactly `step` [s], in place; under step control by as many\n"
+           "steps as needed. Returns a StepReport; if it did not converge, the state is unchanged.")
+      .def("advance", &advance, arg("state"), arg("limit"), arg("channels") = py::none(),
+           "Takes one step of at most `limit` [s]: of exactly that without step control.")
+      .def("step_derivatives", &step_derivatives, arg("state"), arg("channels") = py::none(),
+           "Exact derivatives of the last step that led to a state, for 'hamel-variational' and\n"
+           "'gauss' with fixed steps; channels: those of the step.\n\n"
+           "Returns a dict: 'by_state' (2 n, 2 n), of positions and momenta by those before;\n"
+           "'by_torque' (2 n, n), by the held torque; 'by_step' (2 n,), by the length 'step_s'.")
+      .def("velocity", &velocity, arg("state"),
+           "Joint velocities at the node, shape (n,) [rad/s or m/s].")
+      .def("energy", &energy, arg("state"), "(kinetic, potential) energy at the node [J].")
+      .def("kick", &kick, arg("state"), arg("dp"),
+           "Adds an impulse at the node, shape (n,) [Nm s or N s].")
+      .def("set_velocity", &set_velocity, arg("state"), arg("v"),
+           "Sets the velocity at the node, shape (n,).");
+}
+
 void add_integrator(py::module_& module) {
   using py::arg;
-  py::class_<BoundIntegrator, std::shared_ptr<BoundIntegrator>>(
+  IntegratorClass type(
       module, "Integrator",
-      "A one-step scheme for a model. One call at a time may use it; a state may be copied.")
-      .def(py::init(&make_bound), arg("model").none(false), arg("name") = "hamel-variational",
+      "A one-step scheme for a model. One call at a time may use it; a state may be copied.");
+  type.def(py::init(&make_bound), arg("model").none(false), arg("name") = "hamel-variational",
            "name: one of integrator_names(), possibly with an order: 'gauss:8'.\n"
            "Options as those of `hamelin integrate`: order, solver, rtol, atol, alpha, start,\n"
            "tolerance, max_updates, max_halvings, newmark_beta, newmark_gamma. rtol and atol "
@@ -409,40 +446,9 @@ void add_integrator(py::module_& module) {
           "The condition for StepReport.converged, as text.")
       .def_property_readonly(
           "mode", [](const BoundIntegrator& i) { return i.scheme->mode(); },
-          "'structure' or 'accurate', see the C++ documentation.")
-      .def("start", &start, arg("q0"), arg("v0") = py::none(),
-           "The state at time 0. q0, v0: shape (n,); v0 None: at rest.")
-      .def("step", &step, arg("state"), arg("step"), arg("channels") = py::none(),
-           "Advances the state by exactly `step` [s], in place; under step control by as many\n"
-           "steps as needed. Returns a StepReport; if it did not converge, the state is unchanged.")
-      .def("advance", &advance, arg("state"), arg("limit"), arg("channels") = py::none(),
-           "Takes one step of at most `limit` [s]: of exactly that without step control.")
-      .def("step_derivatives", &step_derivatives, arg("state"), arg("channels") = py::none(),
-           "Exact derivatives of the last step that led to a state, for 'hamel-variational' and\n"
-           "'gauss' with fixed steps; channels: those of the step.\n\n"
-           "Returns a dict: 'by_state' (2 n, 2 n), of positions and momenta by those before;\n"
-           "'by_torque' (2 n, n), by the held torque; 'by_step' (2 n,), by the length 'step_s'.")
-      .def("velocity", &velocity, arg("state"),
-           "Joint velocities at the node, shape (n,) [rad/s or m/s].")
-      .def("energy", &energy, arg("state"), "(kinetic, potential) energy at the node [J].")
-      .def(
-          "kick",
-          [](BoundIntegrator& i, PyState& state, py::handle dp) {
-            const Eigen::VectorXd impulse = vector_of("kick", "dp", dp, i.model->model.dof());
-            const Use use(i);
-            i.scheme->kick(state, impulse);
-          },
-          arg("state"), arg("dp"), "Adds an impulse at the node, shape (n,) [Nm s or N s].")
-      .def(
-          "set_velocity",
-          [](BoundIntegrator& i, PyState& state, py::handle v) {
-            const Eigen::VectorXd velocity =
-                vector_of("set_velocity", "v", v, i.model->model.dof());
-            const Use use(i);
-            i.scheme->set_velocity(state, velocity);
-          },
-          arg("state"), arg("v"), "Sets the velocity at the node, shape (n,).")
-      .def(
+          "'structure' or 'accurate', see the C++ documentation.");
+  add_steps(type);
+  type.def(
           "simulate", &simulate, arg("q0"), arg("v0") = py::none(), py::kw_only(), arg("step"),
           arg("duration"), arg("channels") = py::none(), arg("every") = 1,
           arg("on_step") = py::none(),

@@ -280,17 +280,10 @@ SharedModel from_state(const py::tuple& state) {
                    pose_of("Model", "base", state[1]), vector3_of("Model", "gravity", state[2])));
 }
 
-void add_properties(py::class_<BoundModel, SharedModel>& type) {
+void add_joint_properties(py::class_<BoundModel, SharedModel>& type) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   using Joint = model::Joint;
   type.def_property_readonly(
-          "name", [](const BoundModel& m) { return m.model.robot().name; }, "Name of the robot.")
-      .def_property_readonly(
-          "dof", [](const BoundModel& m) { return m.model.dof(); }, "Number of joints n.")
-      .def_property_readonly(
-          "planar", [](const BoundModel& m) { return m.model.planar(); },
-          "Whether all joints move in one plane; the algorithms then use SE(2).")
-      .def_property_readonly(
           "joint_names",
           [](const BoundModel& m) { return names(m, [](const auto& l) { return l.joint.name; }); },
           "Names of the joints, from the base to the tip.")
@@ -303,13 +296,6 @@ void add_properties(py::class_<BoundModel, SharedModel>& type) {
             });
           },
           "'revolute' or 'prismatic' for each joint.")
-      .def_property_readonly(
-          "link_names",
-          [](const BoundModel& m) { return names(m, [](const auto& l) { return l.name; }); },
-          "Names of the moving links, from the base to the tip.")
-      .def_property_readonly(
-          "tip_name", [](const BoundModel& m) { return m.model.robot().tip.name; },
-          "Name of the frame that goals refer to.")
       .def_property_readonly(
           "lower", [](const BoundModel& m) { return per_joint(m, &Joint::lower, -infinity); },
           "Lower position limits, shape (n,) [rad or m]; -inf without a limit.")
@@ -332,7 +318,24 @@ void add_properties(py::class_<BoundModel, SharedModel>& type) {
           "Dry friction, shape (n,) [Nm or N]; not part of the dynamics below.")
       .def_property_readonly(
           "armature", [](const BoundModel& m) { return per_joint(m, &Joint::armature); },
-          "Rotor inertia at the joints, shape (n,) [kg m^2 or kg].")
+          "Rotor inertia at the joints, shape (n,) [kg m^2 or kg].");
+}
+
+void add_properties(py::class_<BoundModel, SharedModel>& type) {
+  type.def_property_readonly(
+          "name", [](const BoundModel& m) { return m.model.robot().name; }, "Name of the robot.")
+      .def_property_readonly(
+          "dof", [](const BoundModel& m) { return m.model.dof(); }, "Number of joints n.")
+      .def_property_readonly(
+          "planar", [](const BoundModel& m) { return m.model.planar(); },
+          "Whether all joints move in one plane; the algorithms then use SE(2).")
+      .def_property_readonly(
+          "link_names",
+          [](const BoundModel& m) { return names(m, [](const auto& l) { return l.name; }); },
+          "Names of the moving links, from the base to the tip.")
+      .def_property_readonly(
+          "tip_name", [](const BoundModel& m) { return m.model.robot().tip.name; },
+          "Name of the frame that goals refer to.")
       .def_property_readonly(
           "mass", [](const BoundModel& m) { return dynamics::total_mass(m.model); },
           "Mass of all moving links [kg].")
@@ -419,6 +422,7 @@ void add_models(py::module_& module) {
            "base: pose of the robot's base in the world, shape (4, 4); None: identity.\n"
            "gravity: shape (3,) [m/s^2]; None: (0, 0, -9.81).");
   add_properties(type);
+  add_joint_properties(type);
   add_dynamics(type);
   add_derivatives(type);
   add_kinematics(type);

@@ -49,15 +49,33 @@ control::PointFrame frame_of(const PointArray& points, py::handle pose, double t
   return frame;
 }
 
-}  // namespace
+py::dict insert_points(const BoundWorld& w, const PointArray& points, py::handle pose,
+                       double time_s, const std::string& mount,
+                       const std::optional<std::string>& frame_name, std::int32_t source,
+                       double range_m) {
+  control::PointFrame frame = frame_of(points, pose, time_s, mount, frame_name, range_m);
+  frame.source = source;
+  control::FrameReport report;
+  {
+    const py::gil_scoped_release unlocked;
+    report = w.get().insert_points(frame);
+  }
+  py::dict out;
+  out["snapshot"] = report.snapshot;
+  out["points"] = report.points;
+  out["on_arm"] = report.on_arm;
+  out["on_obstacles"] = report.on_obstacles;
+  out["movers"] = report.movers;
+  out["occupied"] = report.occupied;
+  out["cleared"] = report.cleared;
+  return out;
+}
 
-void add_world(py::module_& module) {
+using WorldClass = py::class_<BoundWorld, std::shared_ptr<BoundWorld>>;
+
+void add_obstacle_updates(WorldClass& type) {
   using py::arg;
-  py::class_<BoundWorld, std::shared_ptr<BoundWorld>>(
-      module, "World",
-      "The surroundings of a controller. Any thread may update them; an update\n"
-      "takes effect at the next tick and returns the number of its snapshot.")
-      .def(
+  type.def(
           "set_obstacle",
           [](const BoundWorld& w, py::handle obstacle) {
             const auto read =
@@ -107,8 +125,12 @@ void add_world(py::module_& module) {
             const py::gil_scoped_release unlocked;
             return w.get().last_observed(name);
           },
-          arg("name"), "Time of the last observation [s]; None without one.")
-      .def(
+          arg("name"), "Time of the last observation [s]; None without one.");
+}
+
+void add_map_updates(WorldClass& type) {
+  using py::arg;
+  type.def(
           "set_map",
           [](const BoundWorld& w, py::handle map, py::handle q) {
             const auto read = scene::map_from_json(to_json(map), folder_of(w), "map");
@@ -133,29 +155,8 @@ void add_world(py::module_& module) {
           "Frees and occupies voxels of the map now: a dict as in /map/changes of a scene, whose\n"
           "time_s may be left out and is not used.")
       .def(
-          "insert_points",
-          [](const BoundWorld& w, const PointArray& points, py::handle pose, double time_s,
-             const std::string& mount, const std::optional<std::string>& frame_name,
-             std::int32_t source, double range_m) {
-            control::PointFrame frame = frame_of(points, pose, time_s, mount, frame_name, range_m);
-            frame.source = source;
-            control::FrameReport report;
-            {
-              const py::gil_scoped_release unlocked;
-              report = w.get().insert_points(frame);
-            }
-            py::dict out;
-            out["snapshot"] = report.snapshot;
-            out["points"] = report.points;
-            out["on_arm"] = report.on_arm;
-            out["on_obstacles"] = report.on_obstacles;
-            out["movers"] = report.movers;
-            out["occupied"] = report.occupied;
-            out["cleared"] = report.cleared;
-            return out;
-          },
-          arg("points"), arg("pose"), py::kw_only(), arg("time"), arg("mount") = "world",
-          arg("frame") = py::none(), arg("source") = 0,
+          "insert_points", &insert_points, arg("points"), arg("pose"), py::kw_only(), arg("time"),
+          arg("mount") = "world", arg("frame") = py::none(), arg("source") = 0,
           arg("range") = std::numeric_limits<double>::infinity(),
           "Makes what a depth sensor saw part of the map, which must exist. points: shape (N, 3),\n"
           "in the sensor's frame, finite [m]. pose: of the sensor in the frame of its mount,\n"
@@ -166,8 +167,18 @@ void add_world(py::module_& module) {
           "rays\n"
           "to the others free what they pass, and bodies that move become obstacles.\n"
           "Returns the number of the snapshot that knows the frame, and counts of points and\n"
-          "voxels.")
-      .def_property_readonly(
+          "voxels.");
+}
+
+}  // namespace
+
+void add_world(py::module_& module) {
+  WorldClass type(module, "World",
+                  "The surroundings of a controller. Any thread may update them; an update\n"
+                  "takes effect at the next tick and returns the number of its snapshot.");
+  add_obstacle_updates(type);
+  add_map_updates(type);
+  type.def_property_readonly(
           "number",
           [](const BoundWorld& w) {
             const py::gil_scoped_release unlocked;
