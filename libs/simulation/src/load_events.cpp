@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "closed_loop.hpp"
-#include "hamelin/control/preparation.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/scene/payload.hpp"
 #include "loop/loaded_arm.hpp"
 
 namespace hamelin::simulation {
@@ -152,8 +152,8 @@ void ClosedLoop::record_load(const std::string& name, const char* what) {
 void ClosedLoop::take_load() {
   const integration::Energy before = plant_->energy();
   // in place: plant and actuation refer to it
-  model_ = control::carrying(bare_, carried_, scene_.model.self_collision, scene_.safety.margin_m,
-                             plant_->node().q);
+  model_ = scene::carrying(bare_, carried_, scene_.model.self_collision, scene_.safety.margin_m,
+                           plant_->node().q);
   plant_->take_load();
   actuation_->take_load();
   if (tracking_) tracking_->take_load();

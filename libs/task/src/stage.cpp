@@ -6,6 +6,7 @@
 #include "hamelin/control/plan_paths.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/scene/payload.hpp"
 
 namespace hamelin::task {
 
@@ -103,8 +104,8 @@ std::optional<Stage::Way> Stage::search(const Situation& from, const scene::Goal
   scene.goals = {goal};
   scene.seed += static_cast<std::uint64_t>(round);
   const model::Model arm =
-      from.held ? control::carrying(bare_, {&from.held->payload, 1}, scene.model.self_collision,
-                                    scene.safety.margin_m, from.held->q)
+      from.held ? scene::carrying(bare_, {&from.held->payload, 1}, scene.model.self_collision,
+                                  scene.safety.margin_m, from.held->q)
                 : bare_;
   const control::PathPlan plan =
       control::plan_paths(scene, arm, world_, {.motions = true, .poll = poll_});

@@ -8,8 +8,8 @@
 #include <limits>
 #include <optional>
 
-#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/scene/payload.hpp"
 #include "hamelin/scene/self_collision.hpp"
 
 namespace hamelin::test {
@@ -251,7 +251,7 @@ std::optional<model::Model> Disturbances::take_load() {
   load_ = answer.load;
   ++events_.loads;
   note(fmt::format("{} loads carried", loads_[load_].size()));
-  return control::carrying(bare_, loads_[load_], true, 0.0, arm_.q());
+  return scene::carrying(bare_, loads_[load_], true, 0.0, arm_.q());
 }
 
 }  // namespace hamelin::test

@@ -43,7 +43,7 @@ TEST_CASE("a controller holds what is attached to its arm", "[control][load]") {
   CHECK(loop.controller.answer().load != number);
   // the arm itself gets the body at the same time
   const VectorXd q = loop.state.q, v = loop.v;
-  loop.arm = control::carrying(loop.arm, {&box, 1}, false, 0.0, q);
+  loop.arm = scene::carrying(loop.arm, {&box, 1}, false, 0.0, q);
   loop.integrator = integration::make_integrator("hamel-variational", loop.arm);
   const long k = loop.state.k;
   loop.state = loop.integrator->start(q, v);
@@ -132,7 +132,7 @@ TEST_CASE("parts that the payload touches when it is attached may go on to touch
   long_box.spheres = {{{0.0, 0.0, -0.12}, 0.08}};  // back into the wrist
   const auto pairs_of_box = [&](double touching_m) {
     const model::Model loaded =
-        control::carrying(bare, {&long_box, 1}, true, touching_m, scene.start_q);
+        scene::carrying(bare, {&long_box, 1}, true, touching_m, scene.start_q);
     const scene::SelfField field(loaded);
     std::vector<std::string> out;
     for (std::size_t i = 0; i < field.pairs().size(); ++i)
@@ -148,7 +148,7 @@ TEST_CASE("parts that the payload touches when it is attached may go on to touch
   CHECK(listed(pairs_of_box(0.0), "'link2' and 'box'"));
   // the robot's own pairs stay what they were
   const scene::SelfField before(bare),
-      after(control::carrying(bare, {&long_box, 1}, true, 0.0, scene.start_q));
+      after(scene::carrying(bare, {&long_box, 1}, true, 0.0, scene.start_q));
   std::size_t own = 0;
   for (std::size_t i = 0; i < after.pairs().size(); ++i)
     if (after.describe(static_cast<int>(i)).find("'box'") == std::string::npos) ++own;

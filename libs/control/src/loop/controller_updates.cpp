@@ -173,7 +173,8 @@ Controller::Carried Controller::newest_load() const {
 
 model::Model Controller::model_carrying(std::span<const scene::Payload> payloads,
                                         const VectorXd& q) const {
-  return carrying(nominal_, payloads, scene_.model.self_collision, scene_.safety.margin_m, q);
+  return scene::carrying(nominal_, payloads, scene_.model.self_collision, scene_.safety.margin_m,
+                         q);
 }
 
 std::uint64_t Controller::publish_load(std::vector<scene::Payload> all, const VectorXd& q) {

@@ -1,7 +1,6 @@
 #pragma once
 #include <Eigen/Core>
 #include <filesystem>
-#include <span>
 #include <string_view>
 #include <vector>
 
@@ -33,16 +32,6 @@ namespace hamelin::control {
                                             const scene::JointNumbers& given, const char* key,
                                             const model::Robot& robot,
                                             double model::Joint::*member);
-
-/// A model of the arm that carries payloads. Parts of the arm that a payload touches when it is
-/// attached may go on to touch it.
-/// @param bare the arm without them @param touching_m how near counts as touching [m]
-/// @param self_collision whether it is modelled
-/// @param q configuration in which the last of them is attached; dof numbers
-/// @throws Error invalid for a name that a link or part of the robot has already
-[[nodiscard]] model::Model carrying(const model::Model& bare,
-                                    std::span<const scene::Payload> payloads, bool self_collision,
-                                    double touching_m, const Eigen::VectorXd& q);
 
 /// Checks that start, goals and limits fit the robot. @throws Error invalid, naming the place in
 /// the scene

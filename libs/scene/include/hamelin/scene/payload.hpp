@@ -38,6 +38,16 @@ void check(const Payload& payload, const std::string& where);
 /// @throws Error invalid for a name that a link or part of the robot has already
 [[nodiscard]] model::Robot with_payloads(model::Robot robot, std::span<const Payload> payloads);
 
+/// A model of the arm that carries payloads. Parts of the arm that a payload touches when it is
+/// attached may go on to touch it.
+/// @param bare the arm without them @param touching_m how near counts as touching [m]
+/// @param self_collision whether it is modelled
+/// @param q configuration in which the last of them is attached; dof numbers
+/// @throws Error invalid for a name that a link or part of the robot has already
+[[nodiscard]] model::Model carrying(const model::Model& bare, std::span<const Payload> payloads,
+                                    bool self_collision, double touching_m,
+                                    const Eigen::VectorXd& q);
+
 /// What happens during a run, once, at a time or when goals were reached.
 struct Event {
   std::optional<double> time_s;              ///< not before this time; or
@@ -46,8 +56,8 @@ struct Event {
   /// Name of the obstacle that `attach` is: not in the world until it is detached, and from then on
   /// where the tip leaves it; empty: it is none.
   std::string obstacle;
-  std::optional<std::string> detach;         ///< name of what is not fixed to it any more
-  std::optional<MapChangeSpec> map;          ///< its time is not used
+  std::optional<std::string> detach;  ///< name of what is not fixed to it any more
+  std::optional<MapChangeSpec> map;   ///< its time is not used
   /// Whether a run ends if the controller refuses what is attached; else it goes on without it.
   bool required = true;
 };

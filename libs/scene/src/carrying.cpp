@@ -4,12 +4,12 @@
 #include <utility>
 #include <vector>
 
-#include "hamelin/control/preparation.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/scene/payload.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/scene/shapes.hpp"
 
-namespace hamelin::control {
+namespace hamelin::scene {
 
 using Eigen::VectorXd;
 
@@ -18,7 +18,7 @@ namespace {
 using Pairs = std::vector<std::pair<std::string, std::string>>;
 
 // The pairs of parts on different bodies that a field leaves out.
-Pairs left_out(const scene::SelfField& field) {
+Pairs left_out(const SelfField& field) {
   Pairs out;
   const auto& parts = field.parts();
   const auto checked = [&](std::size_t a, std::size_t b) {
@@ -35,12 +35,11 @@ Pairs left_out(const scene::SelfField& field) {
 }
 
 // The pairs with one of the payloads that are within a distance at q.
-Pairs touching_pairs(const model::Model& model, const scene::SelfField& field,
-                     std::span<const scene::Payload> payloads, double touching_m,
-                     const VectorXd& q) {
+Pairs touching_pairs(const model::Model& model, const SelfField& field,
+                     std::span<const Payload> payloads, double touching_m, const VectorXd& q) {
   dynamics::Workspace ws(model);
   dynamics::forward_kinematics(model, ws, q);
-  scene::PlacedShapes arm(model);
+  PlacedShapes arm(model);
   arm.place(model, ws);
   const auto carried = [&](int part) {
     const std::string& name = field.parts()[static_cast<std::size_t>(part)].name;
@@ -60,12 +59,12 @@ Pairs touching_pairs(const model::Model& model, const scene::SelfField& field,
 
 }  // namespace
 
-model::Model carrying(const model::Model& bare, std::span<const scene::Payload> payloads,
+model::Model carrying(const model::Model& bare, std::span<const Payload> payloads,
                       bool self_collision, double touching_m, const VectorXd& q) {
-  model::Robot robot = scene::with_payloads(bare.robot(), payloads);
+  model::Robot robot = with_payloads(bare.robot(), payloads);
   model::Model loaded(robot, bare.base(), bare.gravity());
   if (!self_collision) return loaded;
-  const scene::SelfField field(loaded);
+  const SelfField field(loaded);
   const Pairs touching = touching_pairs(loaded, field, payloads, touching_m, q);
   if (touching.empty()) return loaded;
   // A robot with a list of pairs is checked for all others, neighbours included.
@@ -75,4 +74,4 @@ model::Model carrying(const model::Model& bare, std::span<const scene::Payload> 
   return model::Model(std::move(robot), bare.base(), bare.gravity());
 }
 
-}  // namespace hamelin::control
+}  // namespace hamelin::scene
