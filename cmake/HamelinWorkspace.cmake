@@ -53,7 +53,7 @@ if(HAMELIN_SANITIZE)
 endif()
 
 # hamelin_library(NAME model [DEPS geometry ...] [SOURCES src/a.cpp ...] [LINKS Eigen3::Eigen]
-#                 [PRIVATE_LINKS ...] [PACKAGES Eigen3 ...] [TEST_LINKS hamelin::io ...] [COLD])
+#                 [PRIVATE_LINKS ...] [PACKAGES Eigen3 ...] [TEST_LINKS hamelin::io ...] [COLD] [INTERNAL])
 #
 # Defines hamelin::NAME in the calling folder: headers in include/hamelin/NAME, tests/*_test.cpp as
 # one test program, bench/*_bench.cpp as one benchmark program. A DEP must precede NAME in
@@ -61,9 +61,9 @@ endif()
 # PACKAGES are the packages that find_package(hamelin COMPONENTS NAME) must find for the libraries
 # in LINKS and PRIVATE_LINKS. TEST_LINKS are libraries that only the tests need; they may come later
 # than NAME. COLD marks a library that is not performance-critical and is compiled with less
-# optimisation.
+# optimisation. INTERNAL marks one that is not installed: programs of the workspace link it.
 function(hamelin_library)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "COLD" "NAME"
+  cmake_parse_arguments(PARSE_ARGV 0 arg "COLD;INTERNAL" "NAME"
     "DEPS;SOURCES;LINKS;PRIVATE_LINKS;PACKAGES;TEST_LINKS;TEST_LABELS")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "hamelin_library(${arg_NAME}): unknown argument ${arg_UNPARSED_ARGUMENTS}")
@@ -94,10 +94,12 @@ function(hamelin_library)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS include/*.hpp include/*.h)
   target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS include FILES ${headers})
   set_target_properties(${target} PROPERTIES VERIFY_INTERFACE_HEADER_SETS ON)
-  set_property(GLOBAL APPEND PROPERTY HAMELIN_LIBS ${arg_NAME})
-  set_property(GLOBAL PROPERTY HAMELIN_DEPS_${arg_NAME} ${arg_DEPS})
-  set_property(GLOBAL PROPERTY HAMELIN_PACKAGES_${arg_NAME} ${arg_PACKAGES})
-  install(TARGETS ${target} EXPORT hamelin_${arg_NAME} FILE_SET HEADERS)
+  if(NOT arg_INTERNAL)
+    set_property(GLOBAL APPEND PROPERTY HAMELIN_LIBS ${arg_NAME})
+    set_property(GLOBAL PROPERTY HAMELIN_DEPS_${arg_NAME} ${arg_DEPS})
+    set_property(GLOBAL PROPERTY HAMELIN_PACKAGES_${arg_NAME} ${arg_PACKAGES})
+    install(TARGETS ${target} EXPORT hamelin_${arg_NAME} FILE_SET HEADERS)
+  endif()
   hamelin_tests(NAME ${arg_NAME} LINKS hamelin::${arg_NAME} ${arg_TEST_LINKS} LABELS ${arg_TEST_LABELS})
   hamelin_benchmarks(NAME ${arg_NAME} LINKS hamelin::${arg_NAME})
 endfunction()

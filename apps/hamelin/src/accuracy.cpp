@@ -6,6 +6,7 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
+#include "document.hpp"
 #include "free_motion.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
@@ -140,7 +141,21 @@ void add_accuracy(CLI::App& app, int& exit_code) {
   command->callback([flags, &exit_code] { exit_code = run_accuracy(*flags); });
 }
 
+// What `hamelin report` shows of measurements.
+std::string page_of_measurements(const std::vector<std::filesystem::path>& files) {
+  std::vector<accuracy::Measurement> all;
+  for (const auto& file : files) {
+    if (kind_of(file) != Kind::accuracy)
+      throw Error(ErrorCode::invalid, fmt::format("{}: is not a measurement of accuracy, expected "
+                                                  "either measurements only or logs only",
+                                                  file.string()));
+    all.push_back(accuracy::measurement_from_json(read_json(file), file.string()));
+  }
+  return report::pack(accuracy::page_json(all));
+}
+
 const RegisteredCommand registered_accuracy("accuracy", add_accuracy);
+const RegisteredPage registered_page(Kind::accuracy, "accuracy", page_of_measurements);
 
 }  // namespace
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <map>
+
 #include "command_line.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
@@ -11,6 +13,24 @@
 namespace hamelin::app {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+std::map<Kind, DocumentPage>& pages() {
+  static std::map<Kind, DocumentPage> all;
+  return all;
+}
+
+}  // namespace
+
+RegisteredPage::RegisteredPage(Kind kind, const char* page_template, PageOfDocuments make) {
+  pages()[kind] = {page_template, make};
+}
+
+DocumentPage page_of(Kind kind) {
+  const auto found = pages().find(kind);
+  return found == pages().end() ? DocumentPage{} : found->second;
+}
 
 fs::path page_template(const std::string& name) {
   std::error_code ec;

@@ -7,7 +7,6 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "document.hpp"
-#include "hamelin/accuracy/accuracy.hpp"
 #include "hamelin/core/error.hpp"
 #include "output.hpp"
 #include "page.hpp"
@@ -34,19 +33,14 @@ Json json_of(const report::RunSummary& run) {
 
 // Measurements of `hamelin accuracy` have a page template of their own.
 int make_accuracy_page(const ReportOptions& options, const fs::path& target) {
-  const fs::path template_file = page_template("accuracy");
-  std::vector<accuracy::Measurement> all;
-  for (const auto& file : options.logs) {
-    if (kind_of(file) != Kind::accuracy)
-      throw Error(ErrorCode::invalid, fmt::format("{}: is not a measurement of accuracy, expected "
-                                                  "either measurements only or logs only",
-                                                  file.string()));
-    all.push_back(accuracy::measurement_from_json(read_json(file), file.string()));
-  }
-  const std::size_t size =
-      write_page(template_file, report::pack(accuracy::page_json(all)), target);
+  const DocumentPage page = page_of(Kind::accuracy);
+  if (page.make == nullptr) throw Error(ErrorCode::usage, absence_of("accuracy"));
+  const fs::path template_file = page_template(page.page_template);
+  const std::size_t size = write_page(template_file, page.make(options.logs), target),
+                    measurements = options.logs.size();
   if (options.json)
-    print_json({{"page", options.output.string()}, {"bytes", size}, {"measurements", all.size()}});
+    print_json(
+        {{"page", options.output.string()}, {"bytes", size}, {"measurements", measurements}});
   else
     report(fmt::format("wrote {} ({:.2f} MB)\n", options.output.string(),
                        1e-6 * static_cast<double>(size)));
