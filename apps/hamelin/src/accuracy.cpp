@@ -77,6 +77,55 @@ int run_accuracy(const AccuracyFlags& flags) {
   return 0;
 }
 
+void add_measurement_options(CLI::App& command, AccuracyFlags& flags) {
+  command
+      .add_option(
+          "--integrators", flags.integrators,
+          fmt::format(
+              "comma-separated list such as gauss:8,rk4, with the order after a colon; one of {}",
+              fmt::join(integration::integrator_names(), ", ")))
+      ->required()
+      ->type_name("a,b,..");
+  command
+      .add_option("--steps", flags.steps,
+                  "fixed steps [s]; the duration is an integer multiple of each")
+      ->type_name("H,H,..");
+  command.add_option("--rtol", flags.rtols, "relative tolerances of integrators with step control")
+      ->type_name("E,E,..");
+  command
+      .add_option("--atol", flags.atol,
+                  "absolute tolerance of step control (default equal to --rtol)")
+      ->type_name("E");
+  command
+      .add_option("--tolerance", flags.tolerances,
+                  "tolerance of root-finding with fixed steps, see `hamelin integrate` (default "
+                  "depends on the integrator)")
+      ->type_name("E,E,..");
+  command
+      .add_option("--duration", flags.duration_s, "simulated time [s] (default the scene's, or 10)")
+      ->type_name("T");
+  command
+      .add_option("--every", flags.every,
+                  "sample the energy every K fixed steps (default: the smallest K that gives at "
+                  "most 131072 samples)")
+      ->type_name("K")
+      ->check(CLI::Range(1L, 1000000000L));
+  command.add_flag("--no-reference", flags.no_reference,
+                   "measure energy and time only, without a reference, for long motions");
+}
+
+void add_output_flags(CLI::App& command, AccuracyFlags& flags) {
+  command.add_flag("--json", flags.json, "print JSON (hamelin.accuracy/1)");
+  command.add_flag("--markdown", flags.markdown, "print tables in Markdown")->excludes("--json");
+  command.add_option("-o,--output", flags.output, "write the JSON document to a file")
+      ->type_name("ACCURACY.json");
+  command
+      .add_option("--page", flags.page,
+                  "write an HTML page with plots and tables; `hamelin report` combines several "
+                  "measurements")
+      ->type_name("PAGE.html");
+}
+
 void add_accuracy(CLI::App& app, int& exit_code) {
   auto* command = add_command(app, "accuracy",
                               "Measure speed against error of integrators on a robot. Every "
@@ -93,51 +142,8 @@ void add_accuracy(CLI::App& app, int& exit_code) {
                               "--duration 100 --no-reference --json");
   const auto flags = std::make_shared<AccuracyFlags>();
   add_motion_flags(*command, flags->motion);
-  command
-      ->add_option(
-          "--integrators", flags->integrators,
-          fmt::format(
-              "comma-separated list such as gauss:8,rk4, with the order after a colon; one of {}",
-              fmt::join(integration::integrator_names(), ", ")))
-      ->required()
-      ->type_name("a,b,..");
-  command
-      ->add_option("--steps", flags->steps,
-                   "fixed steps [s]; the duration is an integer multiple of each")
-      ->type_name("H,H,..");
-  command
-      ->add_option("--rtol", flags->rtols, "relative tolerances of integrators with step control")
-      ->type_name("E,E,..");
-  command
-      ->add_option("--atol", flags->atol,
-                   "absolute tolerance of step control (default equal to --rtol)")
-      ->type_name("E");
-  command
-      ->add_option("--tolerance", flags->tolerances,
-                   "tolerance of root-finding with fixed steps, see `hamelin integrate` (default "
-                   "depends on the integrator)")
-      ->type_name("E,E,..");
-  command
-      ->add_option("--duration", flags->duration_s,
-                   "simulated time [s] (default the scene's, or 10)")
-      ->type_name("T");
-  command
-      ->add_option("--every", flags->every,
-                   "sample the energy every K fixed steps (default: the smallest K that gives at "
-                   "most 131072 samples)")
-      ->type_name("K")
-      ->check(CLI::Range(1L, 1000000000L));
-  command->add_flag("--no-reference", flags->no_reference,
-                    "measure energy and time only, without a reference, for long motions");
-  command->add_flag("--json", flags->json, "print JSON (hamelin.accuracy/1)");
-  command->add_flag("--markdown", flags->markdown, "print tables in Markdown")->excludes("--json");
-  command->add_option("-o,--output", flags->output, "write the JSON document to a file")
-      ->type_name("ACCURACY.json");
-  command
-      ->add_option("--page", flags->page,
-                   "write an HTML page with plots and tables; `hamelin report` combines several "
-                   "measurements")
-      ->type_name("PAGE.html");
+  add_measurement_options(*command, *flags);
+  add_output_flags(*command, *flags);
   command->callback([flags, &exit_code] { exit_code = run_accuracy(*flags); });
 }
 

@@ -91,6 +91,69 @@ int optimize(OptimizeOptions options) {
   return motion.valid() ? 0 : 1;
 }
 
+void add_motion_options(CLI::App& command, OptimizeOptions& options) {
+  optimal::SceneMotionOptions& motion = options.motion;
+  const CLI::Range positive(1e-9, 1e12);
+  restrict_values(
+      command
+          .add_option("--minimize", options.minimize,
+                      "effort: the integral of squared torques, each as a share of its limit; or "
+                      "time")
+          ->capture_default_str(),
+      {"effort", "time"});
+  command
+      .add_option("--duration", motion.duration_s,
+                  "time to each goal [s]; with --minimize time the first guess (default: at half "
+                  "of the velocity limits)")
+      ->type_name("T")
+      ->check(positive);
+  command
+      .add_option("--intervals", motion.intervals,
+                  "intervals between knots, to each goal; more where torques between the knots "
+                  "need them")
+      ->type_name("N")
+      ->check(CLI::Range(optimal::least_intervals, optimal::most_intervals))
+      ->capture_default_str();
+  command
+      .add_option("--margin", motion.margin_m, "least clearance, which is proved at all times [m]")
+      ->type_name("M")
+      ->check(CLI::Range(0.0, 0.1))
+      ->capture_default_str();
+  command
+      .add_option("--limit-share", motion.limit_share,
+                  "share of the limits of velocity and torque that the motion may use; the rest is "
+                  "for the feedback of an arm that follows it (default 1 of velocities, 0.9 of "
+                  "torques)")
+      ->type_name("S")
+      ->check(CLI::Range(0.01, 1.0));
+  command
+      .add_option("--acceleration", motion.acceleration,
+                  "limit of all joints [rad/s^2 or m/s^2] (default: none)")
+      ->type_name("A")
+      ->check(positive);
+  command
+      .add_option("--jerk", motion.jerk, "limit of all joints [rad/s^3 or m/s^3] (default: none)")
+      ->type_name("J")
+      ->check(positive);
+}
+
+void add_output_options(CLI::App& command, OptimizeOptions& options) {
+  restrict_values(command
+                      .add_option("--format", options.format,
+                                  "of the output: json, csv, or ros for the fields of "
+                                  "trajectory_msgs/msg/JointTrajectory")
+                      ->capture_default_str(),
+                  {"json", "csv", "ros"});
+  command
+      .add_option("--rate", options.rate_hz,
+                  "write this number of points per second (default: the knots)")
+      ->type_name("HZ")
+      ->check(CLI::Range(1e-9, 1e12));
+  command.add_option("-o,--output", options.output, "file to write the motion to")
+      ->type_name("FILE");
+  command.add_flag("--json", options.json, "print JSON");
+}
+
 void add_optimize(CLI::App& app, int& exit_code) {
   auto* command = add_command(
       app, "optimize",
@@ -100,68 +163,12 @@ void add_optimize(CLI::App& app, int& exit_code) {
       "hamelin optimize data/scenes/pillar.json --minimize time --rate 1000 --format csv "
       "-o fast.csv");
   const auto options = std::make_shared<OptimizeOptions>();
-  optimal::SceneMotionOptions& motion = options->motion;
-  const CLI::Range positive(1e-9, 1e12);
   command->add_option("scene", options->file, "scene file")->required()->type_name("SCENE.json");
   add_guide_option(*command, options->flags);
-  restrict_values(
-      command
-          ->add_option("--minimize", options->minimize,
-                       "effort: the integral of squared torques, each as a share of its limit; or "
-                       "time")
-          ->capture_default_str(),
-      {"effort", "time"});
-  command
-      ->add_option("--duration", motion.duration_s,
-                   "time to each goal [s]; with --minimize time the first guess (default: at half "
-                   "of the velocity limits)")
-      ->type_name("T")
-      ->check(positive);
-  command
-      ->add_option("--intervals", motion.intervals,
-                   "intervals between knots, to each goal; more where torques between the knots "
-                   "need them")
-      ->type_name("N")
-      ->check(CLI::Range(optimal::least_intervals, optimal::most_intervals))
-      ->capture_default_str();
-  command
-      ->add_option("--margin", motion.margin_m, "least clearance, which is proved at all times [m]")
-      ->type_name("M")
-      ->check(CLI::Range(0.0, 0.1))
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--limit-share", motion.limit_share,
-          "share of the limits of velocity and torque that the motion may use; the rest is "
-          "for the feedback of an arm that follows it (default 1 of velocities, 0.9 of "
-          "torques)")
-      ->type_name("S")
-      ->check(CLI::Range(0.01, 1.0));
-  command
-      ->add_option("--acceleration", motion.acceleration,
-                   "limit of all joints [rad/s^2 or m/s^2] (default: none)")
-      ->type_name("A")
-      ->check(positive);
-  command
-      ->add_option("--jerk", motion.jerk, "limit of all joints [rad/s^3 or m/s^3] (default: none)")
-      ->type_name("J")
-      ->check(positive);
+  add_motion_options(*command, *options);
   add_set_option(*command, options->flags.set,
                  "set one value of the scene, e.g. /model/torque_limits=false; may be repeated");
-  restrict_values(command
-                      ->add_option("--format", options->format,
-                                   "of the output: json, csv, or ros for the fields of "
-                                   "trajectory_msgs/msg/JointTrajectory")
-                      ->capture_default_str(),
-                  {"json", "csv", "ros"});
-  command
-      ->add_option("--rate", options->rate_hz,
-                   "write this number of points per second (default: the knots)")
-      ->type_name("HZ")
-      ->check(positive);
-  command->add_option("-o,--output", options->output, "file to write the motion to")
-      ->type_name("FILE");
-  command->add_flag("--json", options->json, "print JSON");
+  add_output_options(*command, *options);
   command->callback([options, &exit_code] { exit_code = optimize(*options); });
 }
 

@@ -109,75 +109,77 @@ void make_chain(const ChainFlags& flags) {
     report(fmt::format("{}: {} joints\n", flags.output.string(), robot.dof()));
 }
 
+void add_robot_info(CLI::App& robot, int& exit_code) {
+  auto* command = add_command(
+      robot, "info",
+      "Print the joints, limits, masses and collision shapes of a robot. Notes say what its reader "
+      "lumped, locked or "
+      "skipped",
+      "hamelin robot info data/robots/arm7.urdf\n"
+      "hamelin robot info data/robots/arm7.urdf --spheres data/robots/arm7.spheres.json --json");
+  const auto options = std::make_shared<RobotInfoOptions>();
+  command->add_option("file", options->file, "robot file, .urdf or JSON")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--tip", options->tip, "tip link (default for a URDF: its only leaf)")
+      ->type_name("LINK");
+  command
+      ->add_option("--spheres", options->spheres, "sidecar file with collision spheres or capsules")
+      ->type_name("FILE");
+  command->add_option("--srdf", options->srdf, "SRDF file with pairs of links that may touch")
+      ->type_name("FILE.srdf");
+  command->add_flag("--strict", options->strict, strict_help);
+  command->add_flag("--json", options->json, "print JSON");
+  command->callback([options, &exit_code] {
+    print_robot_info(*options);
+    exit_code = 0;
+  });
+}
+
+void add_make_chain(CLI::App& robot, int& exit_code) {
+  auto* command =
+      add_command(robot, "make-chain", "Make a robot file of a chain of equal links along +y",
+                  "hamelin robot make-chain --links 7 --axes x,z,x -o chain7.json\n"
+                  "hamelin robot make-chain --links 3 --axes z --length 0.3 --mass 2 --radius 0.05 "
+                  "-o planar.json");
+  const auto flags = std::make_shared<ChainFlags>();
+  auto& chain = flags->chain;
+  command->add_option("--links", chain.links, "number of links")
+      ->type_name("N")
+      ->capture_default_str();
+  command->add_option("--axes", chain.axes, "joint axes, one per link, repeated cyclically")
+      ->type_name("x,y,z")
+      ->capture_default_str();
+  command->add_option("--length", chain.length_m, "length of each link [m]")
+      ->type_name("L")
+      ->capture_default_str();
+  command->add_option("--mass", chain.mass_kg, "mass of each link [kg]")
+      ->type_name("M")
+      ->capture_default_str();
+  command->add_option("--radius", chain.radius_m, "radius of each link [m]")
+      ->type_name("R")
+      ->capture_default_str();
+  command->add_option("-o,--output", flags->output, "robot file to write")
+      ->required()
+      ->type_name("FILE");
+  command->add_flag("--json", flags->json, "print a summary of the file as JSON");
+  command->callback([flags, &exit_code] {
+    make_chain(*flags);
+    exit_code = 0;
+  });
+}
+
 void add_robot(CLI::App& app, int& exit_code) {
   auto* robot = add_command(app, "robot", "Inspect, check, identify and make robots",
                             "hamelin robot fit arm.urdf -o arm.spheres.json\n"
                             "hamelin robot check arm.urdf --spheres arm.spheres.json\n"
                             "hamelin robot make-chain --links 7 --axes x,z,x -o chain7.json");
   robot->require_subcommand(1);
-
-  auto* info_command = add_command(
-      *robot, "info",
-      "Print the joints, limits, masses and collision shapes of a robot. Notes say what its reader "
-      "lumped, locked or "
-      "skipped",
-      "hamelin robot info data/robots/arm7.urdf\n"
-      "hamelin robot info data/robots/arm7.urdf --spheres data/robots/arm7.spheres.json --json");
-  const auto info_options = std::make_shared<RobotInfoOptions>();
-  info_command->add_option("file", info_options->file, "robot file, .urdf or JSON")
-      ->required()
-      ->type_name("FILE");
-  info_command
-      ->add_option("--tip", info_options->tip, "tip link (default for a URDF: its only leaf)")
-      ->type_name("LINK");
-  info_command
-      ->add_option("--spheres", info_options->spheres,
-                   "sidecar file with collision spheres or capsules")
-      ->type_name("FILE");
-  info_command
-      ->add_option("--srdf", info_options->srdf, "SRDF file with pairs of links that may touch")
-      ->type_name("FILE.srdf");
-  info_command->add_flag("--strict", info_options->strict, strict_help);
-  info_command->add_flag("--json", info_options->json, "print JSON");
-  info_command->callback([info_options, &exit_code] {
-    print_robot_info(*info_options);
-    exit_code = 0;
-  });
-
+  add_robot_info(*robot, exit_code);
   add_robot_fit(*robot, exit_code);
   add_robot_check(*robot, exit_code);
   add_robot_identify(*robot, exit_code);
-
-  auto* chain_command =
-      add_command(*robot, "make-chain", "Make a robot file of a chain of equal links along +y",
-                  "hamelin robot make-chain --links 7 --axes x,z,x -o chain7.json\n"
-                  "hamelin robot make-chain --links 3 --axes z --length 0.3 --mass 2 --radius 0.05 "
-                  "-o planar.json");
-  const auto chain_flags = std::make_shared<ChainFlags>();
-  auto& chain = chain_flags->chain;
-  chain_command->add_option("--links", chain.links, "number of links")
-      ->type_name("N")
-      ->capture_default_str();
-  chain_command->add_option("--axes", chain.axes, "joint axes, one per link, repeated cyclically")
-      ->type_name("x,y,z")
-      ->capture_default_str();
-  chain_command->add_option("--length", chain.length_m, "length of each link [m]")
-      ->type_name("L")
-      ->capture_default_str();
-  chain_command->add_option("--mass", chain.mass_kg, "mass of each link [kg]")
-      ->type_name("M")
-      ->capture_default_str();
-  chain_command->add_option("--radius", chain.radius_m, "radius of each link [m]")
-      ->type_name("R")
-      ->capture_default_str();
-  chain_command->add_option("-o,--output", chain_flags->output, "robot file to write")
-      ->required()
-      ->type_name("FILE");
-  chain_command->add_flag("--json", chain_flags->json, "print a summary of the file as JSON");
-  chain_command->callback([chain_flags, &exit_code] {
-    make_chain(*chain_flags);
-    exit_code = 0;
-  });
+  add_make_chain(*robot, exit_code);
 }
 
 const RegisteredCommand registered_robot("robot", add_robot);

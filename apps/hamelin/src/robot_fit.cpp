@@ -153,6 +153,46 @@ void run(RobotFitFlags& flags) {
   if (flags.json) print_json(out);
 }
 
+void add_shape_options(CLI::App& command, RobotFitFlags& flags) {
+  auto& fit = flags.fit;
+  command
+      .add_option("--excess", fit.cover.excess_m,
+                  "largest distance by which a shape may stick out [m]")
+      ->type_name("M")
+      ->capture_default_str();
+  command
+      .add_option("--total", fit.total,
+                  "largest number of shapes in total; sets --excess to the least possible")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100'000));
+  command
+      .add_option("--spheres-per-link", fit.cover.count_max,
+                  "largest number of shapes per link, even if they stick out farther")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command.add_flag("--capsules", fit.cover.capsules, "fit capsules instead of spheres");
+  command.add_option("--padding", fit.padding_m, "length added to each radius [m]")
+      ->type_name("M")
+      ->capture_default_str();
+}
+
+void add_mesh_options(CLI::App& command, RobotFitFlags& flags) {
+  auto& fit = flags.fit;
+  command
+      .add_option("--package", flags.packages,
+                  "folder of a ROS package that mesh paths name; may be repeated")
+      ->type_name("NAME=DIR")
+      ->allow_extra_args(false);
+  command
+      .add_option("--meshes", fit.meshes.folders,
+                  "folder to search for meshes, by their path and by shorter and shorter ends of "
+                  "it; may be repeated")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
+  command.add_flag("--visual", fit.visual, "use <visual> of links without <collision>");
+}
+
 }  // namespace
 
 void add_robot_fit(CLI::App& robot, int& exit_code) {
@@ -165,44 +205,13 @@ void add_robot_fit(CLI::App& robot, int& exit_code) {
       "hamelin robot fit arm.urdf --capsules --excess 0.03 --srdf arm.srdf -o arm.capsules.json\n"
       "hamelin robot fit arm.urdf --meshes meshes --compare by_hand.spheres.json --json");
   const auto flags = std::make_shared<RobotFitFlags>();
-  auto& fit = flags->fit;
   command->add_option("file", flags->file, "robot file, .urdf")->required()->type_name("FILE.urdf");
   command
       ->add_option("-o,--output", flags->output,
                    "sidecar file to write, for --spheres and a scene's robot.spheres")
       ->type_name("FILE.json");
-  command
-      ->add_option("--excess", fit.cover.excess_m,
-                   "largest distance by which a shape may stick out [m]")
-      ->type_name("M")
-      ->capture_default_str();
-  command
-      ->add_option("--total", fit.total,
-                   "largest number of shapes in total; sets --excess to the least possible")
-      ->type_name("N")
-      ->check(CLI::Range(1, 100'000));
-  command
-      ->add_option("--spheres-per-link", fit.cover.count_max,
-                   "largest number of shapes per link, even if they stick out farther")
-      ->type_name("N")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  command->add_flag("--capsules", fit.cover.capsules, "fit capsules instead of spheres");
-  command->add_option("--padding", fit.padding_m, "length added to each radius [m]")
-      ->type_name("M")
-      ->capture_default_str();
-  command
-      ->add_option("--package", flags->packages,
-                   "folder of a ROS package that mesh paths name; may be repeated")
-      ->type_name("NAME=DIR")
-      ->allow_extra_args(false);
-  command
-      ->add_option("--meshes", fit.meshes.folders,
-                   "folder to search for meshes, by their path and by shorter and shorter ends of "
-                   "it; may be repeated")
-      ->type_name("DIR")
-      ->allow_extra_args(false);
-  command->add_flag("--visual", fit.visual, "use <visual> of links without <collision>");
+  add_shape_options(*command, *flags);
+  add_mesh_options(*command, *flags);
   command->add_option("--srdf", flags->srdf, "SRDF file whose disabled pairs the sidecar lists too")
       ->type_name("FILE.srdf");
   command
@@ -213,7 +222,7 @@ void add_robot_fit(CLI::App& robot, int& exit_code) {
       ->add_option("--compare", flags->compare,
                    "also measure this sidecar against the geometry; -o is then optional")
       ->type_name("FILE.json");
-  command->add_option("--tolerance", fit.tolerance_m, "accuracy of the bound on a gap [m]")
+  command->add_option("--tolerance", flags->fit.tolerance_m, "accuracy of the bound on a gap [m]")
       ->type_name("M")
       ->capture_default_str();
   command->add_flag("--json", flags->json, "print the figures as JSON");

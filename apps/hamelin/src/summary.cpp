@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "hamelin/scene/tip_constraint.hpp"
@@ -72,85 +73,112 @@ std::string shield_line(const Json& shield) {
                      number(1e3 * shield["margin_m"].get<double>(), 2));
 }
 
+void add_line(std::string& text, const char* name, const std::string& value) {
+  text += fmt::format("{:<12}{}\n", name, value);
+}
+
+void add_outcome(std::string& text, const Json& r) {
+  const auto outcome = r["outcome"].get<std::string>();
+  add_line(text, "outcome",
+           coloured(outcome, colour_of(outcome)) +
+               (r["cause"].is_null() ? "" : fmt::format(": {}", r["cause"].get<std::string>())));
+  add_line(text, "time",
+           fmt::format("{} s, {} steps with {}{}", number(r["time_s"], 6), r["steps"].get<long>(),
+                       r["integrator"].get<std::string>(),
+                       r["planner"].is_null()
+                           ? ""
+                           : fmt::format(", planner {}", r["planner"].get<std::string>())));
+}
+
+std::string clearance_line(const Json& r) {
+  return fmt::format(
+      "{} m at least{}", number(r["min_clearance_m"]),
+      r["certified_share"].is_null()
+          ? ""
+          : fmt::format("; {:.2f} % of the steps proved clear, the tightest by {} m",
+                        100.0 * r["certified_share"].get<double>(), number(r["tightest_step_m"])));
+}
+
+std::string constraint_line(const Json& kept) {
+  const double excess = kept["excess"].get<double>();
+  return fmt::format("{} of goal {} ({}): {} by {} {}", kept["constraint"].get<std::size_t>(),
+                     kept["goal"].get<std::size_t>(), kept["type"].get<std::string>(),
+                     excess > 0.0 ? "exceeded" : "kept", number(std::abs(excess)),
+                     scene::unit_of(kept["type"].get<std::string>()));
+}
+
+// What was reached and kept, where the run has it.
+void add_requirements(std::string& text, const Json& r) {
+  if (!r["goal"].is_null()) add_line(text, "goal", goal_line(r["goal"]));
+  if (r.contains("trajectory")) add_line(text, "trajectory", trajectory_line(r["trajectory"]));
+  if (r.contains("following")) add_line(text, "following", following_line(r["following"]));
+  if (!r["min_clearance_m"].is_null()) add_line(text, "clearance", clearance_line(r));
+  if (r.contains("may_touch"))
+    for (const Json& allowed : r["may_touch"])
+      add_line(text, "may touch",
+               fmt::format("at goal {}, {} m from it at least", allowed["goal"].get<std::size_t>(),
+                           number(allowed["clearance_m"])));
+  if (r.contains("constraints"))
+    for (const Json& kept : r["constraints"]) add_line(text, "constraint", constraint_line(kept));
+}
+
+std::string torque_line(const Json& change) {
+  return fmt::format("changes by {} Nm from tick to tick on the mean, by {} Nm at most",
+                     number(change["mean"], 3), number(change["max"], 3));
+}
+
+std::string plant_line(const Json& plant) {
+  return fmt::format("{} {}; nodes in contact: {} by its own detection, {} by the judge",
+                     plant["type"].get<std::string>(), plant["version"].get<std::string>(),
+                     plant["contacts"].get<long>(), plant["judge_contacts"].get<long>());
+}
+
+void add_energy(std::string& text, const Json& r) {
+  add_line(text, "energy",
+           fmt::format("{} J at the start, {} J at the end, largest error {} J",
+                       number(r["energy_initial_J"]), number(r["energy_final_J"]),
+                       number(r["energy_error_max_J"], 3)));
+  if (!r["planner"].is_null())
+    add_line(text, "work",
+             fmt::format("dissipated {} J, held torque {} J, gyroscopic {} J, node velocity {} "
+                         "J (filter {}, recovery {})",
+                         number(r["dissipated_J"]), number(r["held_work_J"]),
+                         number(r["gyroscopic_work_J"], 2), number(r["node_work_J"]),
+                         number(r["filter_work_J"], 3), number(r["recovery_work_J"], 3)));
+  if (r.contains("external_work_J"))
+    add_line(text, "pushes",
+             fmt::format("wrenches of the surroundings did {} J", number(r["external_work_J"])));
+}
+
+std::string solver_line(const Json& solver) {
+  return fmt::format("{} updates per step, {} at most; residual {} at most ({}); {} halvings",
+                     solver["updates_mean"].is_null() ? "no" : number(solver["updates_mean"], 3),
+                     solver["updates_max"].get<long>(), number(solver["residual_max"], 2),
+                     solver["criterion"].get<std::string>(), solver["halvings"].get<long>());
+}
+
+std::string cpu_line(const Json& timing) {
+  const Json& tick_us = timing["tick_us"];
+  if (tick_us.is_null()) return fmt::format("{} s", number(timing["cpu_s"], 3));
+  return fmt::format("{} s; a tick takes {} us (p50), {} us (p99)", number(timing["cpu_s"], 3),
+                     number(tick_us["p50"], 3), number(tick_us["p99"], 3));
+}
+
 }  // namespace
 
 std::string summary(const Json& r, const std::vector<std::filesystem::path>& written) {
   std::string text;
-  const auto line = [&](const char* name, const std::string& value) {
-    text += fmt::format("{:<12}{}\n", name, value);
-  };
-  const auto outcome = r["outcome"].get<std::string>();
-  line("outcome",
-       coloured(outcome, colour_of(outcome)) +
-           (r["cause"].is_null() ? "" : fmt::format(": {}", r["cause"].get<std::string>())));
-  line("time", fmt::format("{} s, {} steps with {}{}", number(r["time_s"], 6),
-                           r["steps"].get<long>(), r["integrator"].get<std::string>(),
-                           r["planner"].is_null()
-                               ? ""
-                               : fmt::format(", planner {}", r["planner"].get<std::string>())));
-  if (!r["goal"].is_null()) line("goal", goal_line(r["goal"]));
-  if (r.contains("trajectory")) line("trajectory", trajectory_line(r["trajectory"]));
-  if (r.contains("following")) line("following", following_line(r["following"]));
-  if (!r["min_clearance_m"].is_null())
-    line("clearance",
-         fmt::format("{} m at least{}", number(r["min_clearance_m"]),
-                     r["certified_share"].is_null()
-                         ? ""
-                         : fmt::format("; {:.2f} % of the steps proved clear, the tightest by {} m",
-                                       100.0 * r["certified_share"].get<double>(),
-                                       number(r["tightest_step_m"]))));
-  if (r.contains("may_touch"))
-    for (const Json& allowed : r["may_touch"])
-      line("may touch",
-           fmt::format("at goal {}, {} m from it at least", allowed["goal"].get<std::size_t>(),
-                       number(allowed["clearance_m"])));
-  if (r.contains("constraints"))
-    for (const Json& kept : r["constraints"]) {
-      const double excess = kept["excess"].get<double>();
-      line("constraint",
-           fmt::format("{} of goal {} ({}): {} by {} {}", kept["constraint"].get<std::size_t>(),
-                       kept["goal"].get<std::size_t>(), kept["type"].get<std::string>(),
-                       excess > 0.0 ? "exceeded" : "kept", number(std::abs(excess)),
-                       scene::unit_of(kept["type"].get<std::string>())));
-    }
-  if (r.contains("torque_change"))
-    line("torque",
-         fmt::format("changes by {} Nm from tick to tick on the mean, by {} Nm at most",
-                     number(r["torque_change"]["mean"], 3), number(r["torque_change"]["max"], 3)));
-  if (r.contains("shield")) line("shield", shield_line(r["shield"]));
-  if (r.contains("plant"))
-    line(
-        "plant",
-        fmt::format("{} {}; nodes in contact: {} by its own detection, {} by the judge",
-                    r["plant"]["type"].get<std::string>(), r["plant"]["version"].get<std::string>(),
-                    r["plant"]["contacts"].get<long>(), r["plant"]["judge_contacts"].get<long>()));
-  line("q", joints(r["q"]));
-  line("energy", fmt::format("{} J at the start, {} J at the end, largest error {} J",
-                             number(r["energy_initial_J"]), number(r["energy_final_J"]),
-                             number(r["energy_error_max_J"], 3)));
-  if (!r["planner"].is_null())
-    line("work", fmt::format("dissipated {} J, held torque {} J, gyroscopic {} J, node velocity {} "
-                             "J (filter {}, recovery {})",
-                             number(r["dissipated_J"]), number(r["held_work_J"]),
-                             number(r["gyroscopic_work_J"], 2), number(r["node_work_J"]),
-                             number(r["filter_work_J"], 3), number(r["recovery_work_J"], 3)));
-  if (r.contains("external_work_J"))
-    line("pushes",
-         fmt::format("wrenches of the surroundings did {} J", number(r["external_work_J"])));
-  const auto& solver = r["solver"];
-  line("solver",
-       fmt::format("{} updates per step, {} at most; residual {} at most ({}); {} halvings",
-                   solver["updates_mean"].is_null() ? "no" : number(solver["updates_mean"], 3),
-                   solver["updates_max"].get<long>(), number(solver["residual_max"], 2),
-                   solver["criterion"].get<std::string>(), solver["halvings"].get<long>()));
-  const auto& timing = r["timing"];
-  line("cpu",
-       timing["tick_us"].is_null()
-           ? fmt::format("{} s", number(timing["cpu_s"], 3))
-           : fmt::format("{} s; a tick takes {} us (p50), {} us (p99)", number(timing["cpu_s"], 3),
-                         number(timing["tick_us"]["p50"], 3), number(timing["tick_us"]["p99"], 3)));
-  for (const auto& warning : r["warnings"]) line("warning", warning.get<std::string>());
-  for (const auto& file : written) line("written", file.string());
+  add_outcome(text, r);
+  add_requirements(text, r);
+  if (r.contains("torque_change")) add_line(text, "torque", torque_line(r["torque_change"]));
+  if (r.contains("shield")) add_line(text, "shield", shield_line(r["shield"]));
+  if (r.contains("plant")) add_line(text, "plant", plant_line(r["plant"]));
+  add_line(text, "q", joints(r["q"]));
+  add_energy(text, r);
+  add_line(text, "solver", solver_line(r["solver"]));
+  add_line(text, "cpu", cpu_line(r["timing"]));
+  for (const auto& warning : r["warnings"]) add_line(text, "warning", warning.get<std::string>());
+  for (const auto& file : written) add_line(text, "written", file.string());
   return text;
 }
 

@@ -127,6 +127,83 @@ void add_generated_scenes(CLI::App& command, PlanFlags& flags) {
       ->check(unsigned_range());
 }
 
+void add_run_options(CLI::App& command, PlanFlags& flags) {
+  command
+      .add_option(
+          "--planner", flags.plan.planners,
+          "planner, with parameters as in hybrid:escape=none,margin_m=0.01, with a guide as "
+          "in hybrid+rrt-connect, or python:FILE:CLASS; may be repeated (default the scene's)")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  add_set_option(command, flags.plan.set,
+                 "set one value of all scenes, e.g. /step_s=0.002; may be repeated");
+  command
+      .add_option("--vary", flags.plan.vary,
+                  "plan a run for each of these values; if repeated, for each combination")
+      ->type_name("/json/pointer=V,V")
+      ->allow_extra_args(false);
+  command.add_option("--seeds", flags.plan.seeds, "plan a run for each of these seeds")
+      ->type_name("S,S")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->default_str("1")
+      ->check(unsigned_range());
+  command
+      .add_option("--duration", flags.plan.duration_s,
+                  "longest simulated time of a run [s] (default the scene's)")
+      ->type_name("T")
+      ->check(CLI::PositiveNumber);
+}
+
+// The goals of problems, and a sphere on the way to them.
+void add_goal_options(CLI::App& command, PlanFlags& flags) {
+  auto* goal = restrict_values(
+      command.add_option("--goal", flags.goals,
+                         "kind of goal that problems get; may be repeated (default joint)"),
+      {"joint", "position", "pose"});
+  goal->type_name("KIND")->allow_extra_args(false);
+  auto* sphere = command.add_option(
+      "--sphere-on-path", flags.sphere_m,
+      "take the path that hybrid finds as the goal of a problem, and place a sphere "
+      "of this radius on it [m]; problems without a path are left out");
+  sphere->type_name("R")->check(CLI::PositiveNumber)->excludes(goal);
+  command
+      .add_option(
+          "--visible-within", flags.visible_m,
+          "distance from the arm at which the planner first sees that sphere [m] (default any)")
+      ->type_name("D")
+      ->check(CLI::PositiveNumber)
+      ->needs(sphere);
+  auto* swing = command.add_option(
+      "--swing", flags.swing,
+      "let that sphere swing across the path, by A [m] to both sides with the period T [s]");
+  swing->type_name("A,T")->needs(sphere);
+  restrict_values(
+      command.add_option("--prediction", flags.prediction,
+                         "what planners know of its future (default constant-acceleration)"),
+      {"path", "constant-acceleration", "constant-velocity", "speed-bound"})
+      ->type_name("KIND")
+      ->needs(swing);
+}
+
+void add_problem_options(CLI::App& command, PlanFlags& flags) {
+  command.add_option("--robot", flags.plan.problem.robot, "robot file of the problems")
+      ->type_name("FILE");
+  command.add_option("--spheres", flags.plan.problem.spheres, "collision spheres of the robot")
+      ->type_name("FILE.json");
+  command.add_option("--tip", flags.plan.problem.tip, "tip link of the robot")->type_name("LINK");
+  command
+      .add_option("--resolution", flags.plan.problem.resolution_m,
+                  "edge of a voxel in generated maps [m]")
+      ->type_name("R")
+      ->capture_default_str();
+  restrict_values(
+      command.add_option("--mark", flags.mark,
+                         "mark voxels that a primitive touches, or whose centre it contains "
+                         "(default touch)"),
+      {"touch", "centre"});
+}
+
 }  // namespace
 
 void add_sweep_plan(CLI::App& sweep, int& exit_code) {
@@ -139,79 +216,14 @@ void add_sweep_plan(CLI::App& sweep, int& exit_code) {
       "hamelin sweep plan --clutter 20 --pairs 5 --base data/scenes/clutter.json -o tries\n"
       "hamelin sweep plan --gain-sets 50 --base data/scenes/paper_52_apf.json -o gains");
   const auto flags = std::make_shared<PlanFlags>();
-  auto& plan = flags->plan;
-  command->add_option("files", plan.files, "MotionBenchMaker problems and scene files")
+  command->add_option("files", flags->plan.files, "MotionBenchMaker problems and scene files")
       ->type_name("FILE...");
   command->add_option("-o,--output", flags->output, "directory to write the plan and its scenes to")
       ->required()
       ->type_name("DIR");
-  command
-      ->add_option(
-          "--planner", plan.planners,
-          "planner, with parameters as in hybrid:escape=none,margin_m=0.01, with a guide as "
-          "in hybrid+rrt-connect, or python:FILE:CLASS; may be repeated (default the scene's)")
-      ->type_name("NAME")
-      ->allow_extra_args(false);
-  add_set_option(*command, plan.set,
-                 "set one value of all scenes, e.g. /step_s=0.002; may be repeated");
-  command
-      ->add_option("--vary", plan.vary,
-                   "plan a run for each of these values; if repeated, for each combination")
-      ->type_name("/json/pointer=V,V")
-      ->allow_extra_args(false);
-  command->add_option("--seeds", plan.seeds, "plan a run for each of these seeds")
-      ->type_name("S,S")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->default_str("1")
-      ->check(unsigned_range());
-  command
-      ->add_option("--duration", plan.duration_s,
-                   "longest simulated time of a run [s] (default the scene's)")
-      ->type_name("T")
-      ->check(CLI::PositiveNumber);
-  auto* goal = restrict_values(
-      command->add_option("--goal", flags->goals,
-                          "kind of goal that problems get; may be repeated (default joint)"),
-      {"joint", "position", "pose"});
-  goal->type_name("KIND")->allow_extra_args(false);
-  auto* sphere = command->add_option(
-      "--sphere-on-path", flags->sphere_m,
-      "take the path that hybrid finds as the goal of a problem, and place a sphere "
-      "of this radius on it [m]; problems without a path are left out");
-  sphere->type_name("R")->check(CLI::PositiveNumber)->excludes(goal);
-  command
-      ->add_option(
-          "--visible-within", flags->visible_m,
-          "distance from the arm at which the planner first sees that sphere [m] (default any)")
-      ->type_name("D")
-      ->check(CLI::PositiveNumber)
-      ->needs(sphere);
-  auto* swing = command->add_option(
-      "--swing", flags->swing,
-      "let that sphere swing across the path, by A [m] to both sides with the period T [s]");
-  swing->type_name("A,T")->needs(sphere);
-  restrict_values(
-      command->add_option("--prediction", flags->prediction,
-                          "what planners know of its future (default constant-acceleration)"),
-      {"path", "constant-acceleration", "constant-velocity", "speed-bound"})
-      ->type_name("KIND")
-      ->needs(swing);
-  command->add_option("--robot", plan.problem.robot, "robot file of the problems")
-      ->type_name("FILE");
-  command->add_option("--spheres", plan.problem.spheres, "collision spheres of the robot")
-      ->type_name("FILE.json");
-  command->add_option("--tip", plan.problem.tip, "tip link of the robot")->type_name("LINK");
-  command
-      ->add_option("--resolution", plan.problem.resolution_m,
-                   "edge of a voxel in generated maps [m]")
-      ->type_name("R")
-      ->capture_default_str();
-  restrict_values(
-      command->add_option("--mark", flags->mark,
-                          "mark voxels that a primitive touches, or whose centre it contains "
-                          "(default touch)"),
-      {"touch", "centre"});
+  add_run_options(*command, *flags);
+  add_goal_options(*command, *flags);
+  add_problem_options(*command, *flags);
   add_generated_scenes(*command, *flags);
   add_plugin_path_option(*command, flags->plugin_path);
   command->add_flag("--json", flags->json, "print a summary of the plan as JSON");

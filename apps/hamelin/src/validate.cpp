@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
 #include <sstream>
+#include <string>
+#include <string_view>
 
 #include "command_line.hpp"
 #include "commands.hpp"
@@ -72,80 +75,103 @@ std::string check_records(const std::filesystem::path& file) {
   return fmt::format("sweep records, {}", count);
 }
 
+// For kinds of files that have no other rules than their schema.
+std::string check_by_schema(const std::filesystem::path& file, std::string_view schema,
+                            const std::string& description) {
+  check_shipped_schema(read_json(file), schema, file.string());
+  return description;
+}
+
+std::string check_map(const std::filesystem::path& file, std::optional<double> scale) {
+  const auto map = scene::read_map(file, {scale, 0.5});
+  for (const auto& warning : map.warnings) note(fmt::format("{}: {}", file.string(), warning));
+  return describe_map(map);
+}
+
+std::string check_task(const std::filesystem::path& file) {
+  const auto task = task::task_from_json(read_json(file), file.parent_path(), file.string());
+  return fmt::format("task, {} objects, {} steps", task.objects.size(), task.steps.size());
+}
+
+std::string check_waypoints(const std::filesystem::path& file) {
+  const auto path = scene::read_waypoint_path(file, {});
+  return fmt::format("way-points, {}, up to {:.3g} m/s and {:.3g} rad/s", path.waypoints().size(),
+                     path.speed_max(), path.rate_max());
+}
+
+std::string check_plan(const std::filesystem::path& file) {
+  const auto plan = sweep::read_plan_file(file);
+  return fmt::format("sweep plan, {} runs of {} scenes", plan.runs.size(), plan.scenes.size());
+}
+
+std::string check_benchmark(const std::filesystem::path& file) {
+  const Json document = read_json(file);
+  check_shipped_schema(document, "benchmark", file.string());
+  check_shipped_schema(document["summary"], "summary", file.string() + ": /summary");
+  return "benchmark results";
+}
+
+std::string check_archive(const std::filesystem::path& file) {
+  const Json document = read_json(file);
+  check_shipped_schema(document, "archive", file.string());
+  return fmt::format("description of a sweep archive, {} files", document["files"].size());
+}
+
+std::string check_log(const std::filesystem::path& file) {
+  const auto log = log::check_log(file);
+  return fmt::format("log, {} ticks, {} events{}{}", log.ticks, log.events,
+                     log.has_result ? "" : ", no result: unfinished",
+                     log.cut ? ", last line cut" : "");
+}
+
+// @return what the file holds
 std::string check_file(const std::filesystem::path& file, const ValidateOptions& options) {
   switch (kind_of(file)) {
-    case Kind::map: {
-      const auto map = scene::read_map(file, {options.scale, 0.5});
-      for (const auto& warning : map.warnings) note(fmt::format("{}: {}", file.string(), warning));
-      return describe_map(map);
-    }
+    case Kind::map:
+      return check_map(file, options.scale);
     case Kind::urdf:
     case Kind::robot:
       return check_robot(file, {options.tip, {}, {}, options.strict});
     case Kind::scene:
       return check_scene(file, options.strict);
-    case Kind::task: {
-      const auto task = task::task_from_json(read_json(file), file.parent_path(), file.string());
-      return fmt::format("task, {} objects, {} steps", task.objects.size(), task.steps.size());
-    }
+    case Kind::task:
+      return check_task(file);
     case Kind::result:
-      check_shipped_schema(read_json(file), "result", file.string());
-      return "result";
+      return check_by_schema(file, "result", "result");
     case Kind::explanation:
-      check_shipped_schema(read_json(file), "explanation", file.string());
-      return "explanation";
+      return check_by_schema(file, "explanation", "explanation");
     case Kind::path:
-      check_shipped_schema(read_json(file), "path", file.string());
-      return "path";
+      return check_by_schema(file, "path", "path");
     case Kind::trajectory:
-      check_shipped_schema(read_json(file), "trajectory", file.string());
-      return "trajectory";
+      return check_by_schema(file, "trajectory", "trajectory");
     case Kind::primitives:
       return fmt::format(
           "primitives, {} obstacles",
           scene::make_options_from_json(read_json(file), file.string()).primitives.size());
     case Kind::spheres:
       return fmt::format("collision spheres, {}", description::check_spheres(file));
-    case Kind::waypoints: {
-      const auto path = scene::read_waypoint_path(file, {});
-      return fmt::format("way-points, {}, up to {:.3g} m/s and {:.3g} rad/s",
-                         path.waypoints().size(), path.speed_max(), path.rate_max());
-    }
-    case Kind::sweep: {
-      const auto plan = sweep::read_plan_file(file);
-      return fmt::format("sweep plan, {} runs of {} scenes", plan.runs.size(), plan.scenes.size());
-    }
+    case Kind::waypoints:
+      return check_waypoints(file);
+    case Kind::sweep:
+      return check_plan(file);
     case Kind::records:
       return check_records(file);
     case Kind::summary:
-      check_shipped_schema(read_json(file), "summary", file.string());
-      return "sweep summary";
+      return check_by_schema(file, "summary", "sweep summary");
     case Kind::comparison:
-      check_shipped_schema(read_json(file), "comparison", file.string());
-      return "sweep comparison";
+      return check_by_schema(file, "comparison", "sweep comparison");
     case Kind::accuracy:
       return fmt::format(
           "measurement of accuracy, {} rows",
           accuracy::measurement_from_json(read_json(file), file.string()).rows.size());
     case Kind::problems:
       return fmt::format("problem set, {} problems", bench::read_problem_set(file).problems.size());
-    case Kind::benchmark: {
-      const Json document = read_json(file);
-      check_shipped_schema(document, "benchmark", file.string());
-      check_shipped_schema(document["summary"], "summary", file.string() + ": /summary");
-      return "benchmark results";
-    }
-    case Kind::archive: {
-      const Json document = read_json(file);
-      check_shipped_schema(document, "archive", file.string());
-      return fmt::format("description of a sweep archive, {} files", document["files"].size());
-    }
-    case Kind::log: {
-      const auto log = log::check_log(file);
-      return fmt::format("log, {} ticks, {} events{}{}", log.ticks, log.events,
-                         log.has_result ? "" : ", no result: unfinished",
-                         log.cut ? ", last line cut" : "");
-    }
+    case Kind::benchmark:
+      return check_benchmark(file);
+    case Kind::archive:
+      return check_archive(file);
+    case Kind::log:
+      return check_log(file);
   }
   return "";
 }

@@ -115,6 +115,64 @@ Json contact_json(const Result::MoverContact& contact) {
           {"prediction_errors", std::move(errors)}};
 }
 
+Json sensors_json(const Result::Sensors& s) {
+  return {{"frames", s.frames}, {"refused", s.refused},   {"points", s.points},
+          {"on_arm", s.on_arm}, {"occupied", s.occupied}, {"cleared", s.cleared}};
+}
+
+Json guide_json(const Result::Guide& g) {
+  return {{"type", g.type},
+          {"searches", g.searches},
+          {"found", g.found},
+          {"kept", g.kept},
+          {"checks", g.checks},
+          {"waited_s", g.waited_s},
+          {"length", optional(g.length)}};
+}
+
+Json trajectory_json(const Result::Trajectory& t) {
+  return {{"duration_s", t.duration_s},
+          {"time_s", t.time_s},
+          {"error_rms", t.error_rms},
+          {"error_max", t.error_max}};
+}
+
+Json constraint_json(const Result::Constraint& c) {
+  return {{"goal", c.goal},
+          {"constraint", c.constraint},
+          {"type", c.type},
+          {"excess", c.excess},
+          {"time_s", c.time_s}};
+}
+
+Json plant_json(const Result::Plant& p) {
+  return {{"type", p.type},
+          {"version", p.version},
+          {"contacts", p.contacts},
+          {"judge_contacts", p.judge_contacts},
+          {"deepest_m", optional(p.deepest_m)}};
+}
+
+// Members that only some runs have.
+void add_optional_members(const Result& r, Json& document) {
+  if (r.torque_change)
+    document["torque_change"] = {{"mean", r.torque_change->mean()}, {"max", r.torque_change->max}};
+  if (r.external_work_J != 0.0) document["external_work_J"] = r.external_work_J;
+  if (r.position_excess) document["position_excess"] = *r.position_excess;
+  if (r.speed_excess) document["speed_excess"] = *r.speed_excess;
+  if (r.shield) document["shield"] = shield(*r.shield);
+  if (r.sensors) document["sensors"] = sensors_json(*r.sensors);
+  if (r.guide) document["guide"] = guide_json(*r.guide);
+  if (r.following) document["following"] = following_json(*r.following);
+  if (r.trajectory) document["trajectory"] = trajectory_json(*r.trajectory);
+  for (const auto& allowed : r.may_touch)
+    document["may_touch"].push_back(
+        {{"goal", allowed.goal}, {"what", allowed.what}, {"clearance_m", allowed.clearance_m}});
+  for (const auto& kept : r.constraints) document["constraints"].push_back(constraint_json(kept));
+  if (r.mover_contact) document["mover_contact"] = contact_json(*r.mover_contact);
+  if (r.plant) document["plant"] = plant_json(*r.plant);
+}
+
 }  // namespace
 
 std::string_view to_string(Outcome outcome) noexcept {
@@ -203,46 +261,7 @@ Json to_json(const Result& r) {
       {"warnings", r.warnings},
       {"timing", timing(r)},
       {"provenance", r.provenance}};
-  if (r.torque_change)
-    document["torque_change"] = {{"mean", r.torque_change->mean()}, {"max", r.torque_change->max}};
-  if (r.external_work_J != 0.0) document["external_work_J"] = r.external_work_J;
-  if (r.position_excess) document["position_excess"] = *r.position_excess;
-  if (r.speed_excess) document["speed_excess"] = *r.speed_excess;
-  if (r.shield) document["shield"] = shield(*r.shield);
-  if (r.sensors)
-    document["sensors"] = {{"frames", r.sensors->frames},     {"refused", r.sensors->refused},
-                           {"points", r.sensors->points},     {"on_arm", r.sensors->on_arm},
-                           {"occupied", r.sensors->occupied}, {"cleared", r.sensors->cleared}};
-  if (r.guide)
-    document["guide"] = {{"type", r.guide->type},
-                         {"searches", r.guide->searches},
-                         {"found", r.guide->found},
-                         {"kept", r.guide->kept},
-                         {"checks", r.guide->checks},
-                         {"waited_s", r.guide->waited_s},
-                         {"length", r.guide->length ? Json(*r.guide->length) : Json(nullptr)}};
-  if (r.following) document["following"] = following_json(*r.following);
-  if (r.trajectory)
-    document["trajectory"] = {{"duration_s", r.trajectory->duration_s},
-                              {"time_s", r.trajectory->time_s},
-                              {"error_rms", r.trajectory->error_rms},
-                              {"error_max", r.trajectory->error_max}};
-  for (const auto& allowed : r.may_touch)
-    document["may_touch"].push_back(
-        {{"goal", allowed.goal}, {"what", allowed.what}, {"clearance_m", allowed.clearance_m}});
-  for (const auto& kept : r.constraints)
-    document["constraints"].push_back({{"goal", kept.goal},
-                                       {"constraint", kept.constraint},
-                                       {"type", kept.type},
-                                       {"excess", kept.excess},
-                                       {"time_s", kept.time_s}});
-  if (r.mover_contact) document["mover_contact"] = contact_json(*r.mover_contact);
-  if (r.plant)
-    document["plant"] = {{"type", r.plant->type},
-                         {"version", r.plant->version},
-                         {"contacts", r.plant->contacts},
-                         {"judge_contacts", r.plant->judge_contacts},
-                         {"deepest_m", optional(r.plant->deepest_m)}};
+  add_optional_members(r, document);
   for (const auto& replaced : null_non_finite(document))
     document["warnings"].push_back(fmt::format("not finite, written as null: {}", replaced));
   return document;

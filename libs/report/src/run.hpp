@@ -1,6 +1,5 @@
 #pragma once
-#include <Eigen/Core>
-#include <optional>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -9,12 +8,12 @@
 #include "container.hpp"
 #include "drawings.hpp"
 #include "frames.hpp"
-#include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/report/report.hpp"
 #include "hamelin/simulation/replay.hpp"
 #include "loads.hpp"
+#include "plots.hpp"
 #include "seen.hpp"
 #include "stops.hpp"
 #include "world.hpp"
@@ -27,6 +26,8 @@ class Run {
   /// @throws Error invalid if the joints in the header differ from the robot's
   Run(const Json& header, const simulation::Recorded& recorded, const World& world,
       const Options& options);
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
 
   /// @param reader knows the position of the line, for messages
   /// @throws Error invalid for a line that does not belong to a log or is out of order
@@ -38,39 +39,28 @@ class Run {
                             RunSummary& summary);
 
  private:
-  struct Plot {
-    std::string id;
-    std::string title, unit;
-    std::vector<std::pair<std::string, std::size_t>> lines;  ///< label and column
-    bool wide_range;                                         ///< values cover many powers of ten
-  };
-  /// A plot for each unit of the planner's own series.
-  void add_series_plots(const Json& header, std::size_t column);
   void add_tick(const Json& line, const log::LogReader& reader);
+  /// Takes step and time of a tick.
+  void advance(const Json& line, const log::LogReader& reader);
+  [[nodiscard]] Frame read_frame(const Json& line, const log::LogReader& reader) const;
   void add_event(const Json& line, const log::LogReader& reader);
   void add_drawing(const Json& line, const log::LogReader& reader);
   void add_stop(const Json& line, const Frame& frame, const log::LogReader& reader);
-  void set_goal_distance(const Frame& frame);
-  [[nodiscard]] Json plots_json(Container& container) const;
-  [[nodiscard]] Json marks(const Plot& plot) const;
+  /// Notes of what the page omits.
+  void add_notes(const log::LogReader& reader);
 
   const World& world_;
   simulation::Recorded recorded_;
-  dynamics::Workspace ws_;
-  std::size_t plotted_joints_, series_count_;
-  std::vector<Plot> plots_;
-  std::vector<double> row_;  ///< the columns of one tick
-  Bins bins_;
+  Plots plots_;
   EvenSample<Frame> sample_;
   Stops stops_;
   Acts acts_;
   Loads loads_;
   Seen seen_;
   Drawings drawings_;
-  std::optional<std::size_t> evasion_;  ///< number of the series that tells the acts
   Json events_ = Json::array(), result_ = nullptr, config_, provenance_;
   std::size_t events_left_out_ = 0, ticks_ = 0, not_finite_ = 0;
-  double last_k_ = -1.0, time_s_ = 0.0, first_balance_ = 0.0;
+  double last_k_ = -1.0, time_s_ = 0.0;
   std::vector<std::string> notes_;
 };
 

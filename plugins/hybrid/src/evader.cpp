@@ -51,7 +51,7 @@ void Evader::go_own_way() {
   looks_ = false;
 }
 
-void Evader::update(const planning::Tick& tick, const Arm& arm, const Course& course) {
+void Evader::update(const planning::Tick& tick, const Arm& arm, const Way& way) {
   movers_.update(tick.moving_count());
   if (!active()) {
     if (evades() || looks_) go_own_way();
@@ -63,14 +63,14 @@ void Evader::update(const planning::Tick& tick, const Arm& arm, const Course& co
     trail_.forget(std::exchange(trail_age_, 0));
   else
     trail_.add(arm.q);
-  if (looks_ && !(course == course_)) looks_ = false;  // it looked along another way
+  if (looks_ && !(way == way_)) looks_ = false;  // it looked along another way
   if (ticks_++ % look_ticks_ == 0) {
     if (looks_) take_look(tick.time_s());
-    course_ = course;
+    way_ = way;
     looks_ = look_.is_near(arm_.view(), tick.moving_count());
     if (!looks_) return go_own_way();
     const bool keep = evasion_.clear && tick.time_s() - since_s_ < evasion_kept_s;
-    look_.begin(arm.q, arm.v, arm.M, arm.M_inv, course, trail_, evasion_, keep,
+    look_.begin(arm.q, arm.v, arm.M, arm.M_inv, way, trail_, evasion_, keep,
                 static_cast<double>(look_ticks_) * period_s_, budget_);
   }
   if (looks_) look_.advance(steps_);

@@ -28,8 +28,8 @@ class Evader {
   };
   /// Takes the moving obstacles of a tick, and the result of a look that ends with it:
   /// docs/theory.md (10.35).
-  /// @param course the arm's own way
-  void update(const planning::Tick& tick, const Arm& arm, const Course& course);
+  /// @param way the arm's own way
+  void update(const planning::Tick& tick, const Arm& arm, const Way& way);
 
   /// Whether anything moves.
   [[nodiscard]] bool active() const noexcept { return movers_.count() > 0; }
@@ -67,7 +67,7 @@ class Evader {
   Trail trail_;
   Evasion evasion_;  ///< in force
   LookAhead look_;
-  Course course_;       ///< along which it looks
+  Way way_;             ///< along which it looks
   bool looks_ = false;  ///< whether a look is under way
   int budget_ = 1, steps_ = 1;
   Eigen::Index trail_age_ = 0;

@@ -68,13 +68,13 @@ bool LookAhead::is_near(const scene::Shapes& arm, std::size_t count) {
 }
 
 void LookAhead::begin(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::MatrixXd& M,
-                      const Eigen::MatrixXd& M_inv, const Course& course, const Trail& trail,
+                      const Eigen::MatrixXd& M_inv, const Way& way, const Trail& trail,
                       const Evasion& in_force, bool keep, double lead_s, int budget) {
   start_q_ = q + lead_s * v;
   start_v_ = v;
   M_ = M;
   M_inv_ = M_inv;
-  course_ = course;
+  way_ = way;
   trail_.copy(trail);
   in_force_ = in_force;
   keep_ = keep;
@@ -139,7 +139,7 @@ void LookAhead::draw_aside() {
 void LookAhead::start_candidate() {
   q_ = start_q_;
   v_ = start_v_;
-  position_ = course_.position;
+  position_ = way_.position;
   age_ = 0;
   step_ = 0;
   clearance_ = far_m;
@@ -182,7 +182,7 @@ void LookAhead::step() {
 
   surroundings_.query(q_, standing_radius_m, self_radius_m);
   obstacles_.update(model_, ws_, surroundings_.contacts(), surroundings_.self_contacts());
-  margins_.set(obstacles_.points(), law_.margin_weight(model_, ws_, q_, *course_.goal));
+  margins_.set(obstacles_.points(), law_.margin_weight(model_, ws_, q_, *way_.goal));
   double gain = evasion_gain, acceleration = evasion_acceleration;
   set_velocity(gain, acceleration);
   filter_.begin(M_, M_inv_);
@@ -201,20 +201,20 @@ void LookAhead::step() {
 // leave, so the way goes on.
 bool LookAhead::has_arrived() const {
   return candidate_.act == Act::own &&
-         v_.lpNorm<Eigen::Infinity>() < arrival_share * course_.goal->speed_max &&
-         law_.within(model_, ws_, q_, *course_.goal, arrival_share);
+         v_.lpNorm<Eigen::Infinity>() < arrival_share * way_.goal->speed_max &&
+         law_.within(model_, ws_, q_, *way_.goal, arrival_share);
 }
 
 void LookAhead::set_velocity(double& gain, double& acceleration) {
   if (candidate_.act != Act::own) {
     evasion_velocity(candidate_, trail_, q_, age_, u_);
-  } else if (course_.waits) {
+  } else if (way_.waits) {
     u_.setZero();
   } else {
-    Target target{course_.goal, course_.via};
-    if (course_.path != nullptr) {
-      position_ = course_.path->carrot(position_, q_, course_.ahead, via_);
-      target = {course_.goal, &via_, position_ < course_.path->length()};
+    Target target{way_.goal, way_.via};
+    if (way_.path != nullptr) {
+      position_ = way_.path->carrot(position_, q_, way_.ahead, via_);
+      target = {way_.goal, &via_, position_ < way_.path->length()};
     }
     (void)law_.attract(model_, ws_, q_, target, u_);
     gain = target.via != nullptr ? params_.follow_gain : params_.velocity_gain;

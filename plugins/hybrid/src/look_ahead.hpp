@@ -9,7 +9,7 @@
 namespace hamelin::hybrid {
 
 /// The arm's own way: towards the goal, a via, or along a path; or it stands and waits.
-struct Course {
+struct Way {
   const hamelin_goal* goal = nullptr;
   const Eigen::VectorXd* via = nullptr;  ///< replaces the goal, or null
   /// Leads to the goal or the end of an escape, or null.
@@ -20,7 +20,7 @@ struct Course {
   std::uint64_t goal_number = 0;  ///< as hamelin_tick.goal_number
 
   /// Whether it leads the same way, from wherever.
-  [[nodiscard]] bool operator==(const Course& other) const {
+  [[nodiscard]] bool operator==(const Way& other) const {
     return goal_number == other.goal_number && via == other.via && path == other.path &&
            waits == other.waits;
   }
@@ -57,7 +57,7 @@ class LookAhead {
   /// @param trail where the arm came along
   /// @param lead_s time until its result is used @param budget configurations in all
   void begin(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::MatrixXd& M,
-             const Eigen::MatrixXd& M_inv, const Course& course, const Trail& trail,
+             const Eigen::MatrixXd& M_inv, const Way& way, const Trail& trail,
              const Evasion& in_force, bool keep, double lead_s, int budget);
   /// Examines up to `units` configurations.
   void advance(int units);
@@ -101,7 +101,7 @@ class LookAhead {
   // of the look
   Eigen::VectorXd start_q_, start_v_;
   Eigen::MatrixXd M_, M_inv_;
-  Course course_;
+  Way way_;
   Evasion in_force_, best_, candidate_;
 
   bool keep_ = false, done_ = true;

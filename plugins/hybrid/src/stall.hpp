@@ -40,4 +40,61 @@ class StallDetector {
   double best_ = std::numeric_limits<double>::infinity(), since_s_ = 0.0;
 };
 
+/// Stalls where things may move: an evasion keeps a stall from counting for a while, and an arm
+/// that is driven to and fro has stalled too, though the detector takes that for motion.
+class StallWatch {
+ public:
+  /// The arm at the end of a tick.
+  struct Moment {
+    double time_s;
+    double left;                  ///< that remains of the way
+    double speed, closing_speed;  ///< as in StallDetector::stalled()
+    bool held_back;
+    bool evades, moving;  ///< whether the arm evades, and whether there is anything that moves
+  };
+
+  explicit StallWatch(double stall_time_s) : detector_(stall_time_s) {}
+  void set_stall_time(double seconds) noexcept { detector_.set_stall_time(seconds); }
+  void forget_evasion() noexcept { evades_since_s_ = 0.0; }
+  /// Begins anew, on another course.
+  void begin(double time_s) {
+    detector_.restart(time_s);
+    least_left_ = std::numeric_limits<double>::infinity();
+    progress_s_ = time_s;
+  }
+  /// Gives the detector's time once more.
+  void extend(double time_s) { detector_.restart(time_s); }
+  /// The rule of the detector alone.
+  [[nodiscard]] bool stands(const Moment& now) {
+    return detector_.stalled(now.time_s, now.left, now.speed, now.closing_speed, now.held_back);
+  }
+  [[nodiscard]] bool stalled(const Moment& now) {
+    if (!now.evades) {
+      evades_since_s_ = now.time_s;
+    } else if (now.time_s - evades_since_s_ < longest_wait_s && !makes_no_progress(now)) {
+      extend(now.time_s);
+      return false;
+    }
+    return stands(now) || makes_no_progress(now);
+  }
+
+ private:
+  // The longest time for which an evasion keeps a stall from counting [s].
+  static constexpr double longest_wait_s = 6.0;
+  static constexpr double patience_s = 3.0, progress = 0.05;
+
+  // Where something moves, only new bests of the remaining length count.
+  [[nodiscard]] bool makes_no_progress(const Moment& now) {
+    if (now.left < least_left_ - progress || !now.moving) {
+      least_left_ = now.left;
+      progress_s_ = now.time_s;
+    }
+    return now.time_s - progress_s_ > patience_s;
+  }
+
+  StallDetector detector_;
+  double evades_since_s_ = 0.0;
+  double least_left_ = 0.0, progress_s_ = 0.0;  ///< least remaining length, and since when
+};
+
 }  // namespace hamelin::hybrid

@@ -12,10 +12,10 @@ using Eigen::Vector3d;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
 using hybrid::Act;
-using hybrid::Course;
 using hybrid::Evasion;
 using hybrid::LookAhead;
 using hybrid::Trail;
+using hybrid::Way;
 
 namespace {
 
@@ -36,7 +36,7 @@ struct Looks {
         ws(scene.model),
         shapes(scene.model) {
     look.set_params(params);
-    course.goal = &scene.goal();
+    way.goal = &scene.goal();
   }
   [[nodiscard]] bool is_near() {
     dynamics::forward_kinematics(scene.model, ws, q);
@@ -50,7 +50,7 @@ struct Looks {
     dynamics::mass_matrix(scene.model, at, q, M);
     const MatrixXd M_inv = M.inverse();
     REQUIRE(is_near());
-    look.begin(q, v, M, M_inv, course, trail, in_force, keep, lead_s, budget);
+    look.begin(q, v, M, M_inv, way, trail, in_force, keep, lead_s, budget);
   }
   const Evasion& run(int units = enough) {
     for (long before = -1; !look.done() && look.units() != before;) {
@@ -81,7 +81,7 @@ struct Looks {
   LookAhead look;
   Trail trail;
   Evasion own;
-  Course course;
+  Way way;
   VectorXd q, v;
   dynamics::Workspace ws;
   scene::PlacedShapes shapes;
@@ -136,7 +136,7 @@ TEST_CASE("the own way is taken where it stays clear, after one simulation", "[h
 TEST_CASE("an obstacle that will hit the arm where it waits is evaded on a way that is clear",
           "[hybrid][look]") {
   Looks looks(task_with(Vector4d(1.0, 0.0, 0.0, 0.0), falling()));
-  looks.course.waits = true;
+  looks.way.waits = true;
   Evasion stand(4);
   stand.act = Act::stop;
   REQUIRE(looks.simulated(stand) < 0.0);
@@ -157,7 +157,7 @@ TEST_CASE("random ways are simulated as the theory says", "[hybrid][look]") {
                           test::moving_ball({0.6, 0.5, 0.0}, 0.15, {0.0, -1.5, 0.0}));
     task.seed = seed;
     Looks looks(task);
-    looks.course.waits = true;
+    looks.way.waits = true;
     looks.begin();
     const Evasion result = looks.run();
     if (result.act != Act::aside || result.rows) continue;
@@ -186,7 +186,7 @@ TEST_CASE("a way that ends at the goal before the obstacle comes there is clear"
   CHECK(result.act == Act::own);
   CHECK_FALSE(result.rows);
   CHECK(looks.look.units() < 21);
-  looks.course.waits = true;
+  looks.way.waits = true;
   looks.begin();
   CHECK((looks.run().act != Act::own || looks.look.result().rows));
 }
@@ -200,7 +200,7 @@ TEST_CASE("going back along the trail is tried before random ways", "[hybrid][lo
   wall.motion =
       scene::ObservedMotion{0.0, Vector3d(-0.7, 0.0, 0.0), Vector3d::Zero(), Vector3d::Zero()};
   Looks looks(task_with(Vector4d(0.0, 0.0, 0.0, 0.1), wall));
-  looks.course.waits = true;
+  looks.way.waits = true;
   for (int i = 40; i >= 0; --i)  // unfolds
     looks.trail.add(0.05 * i * Vector4d(0.5, -1.0, 1.0, -1.0));
   looks.begin();
@@ -215,7 +215,7 @@ TEST_CASE("going back along the trail is tried before random ways", "[hybrid][lo
 TEST_CASE("an evasion in force is tried first while it is kept, else after the own way",
           "[hybrid][look]") {
   Looks looks(task_with(Vector4d(1.0, 0.0, 0.0, 0.0), falling()));
-  looks.course.waits = true;
+  looks.way.waits = true;
   Evasion in_force(4);
   in_force.act = Act::aside;
   in_force.rows = false;
@@ -283,7 +283,7 @@ TEST_CASE("a look that uses up its budget returns the best way so far", "[hybrid
 TEST_CASE("looks after a reset repeat", "[hybrid][look]") {
   Looks looks(task_with(Vector4d(1.0, 0.0, 0.0, 0.0),
                         test::moving_ball({0.6, 0.5, 0.0}, 0.15, {0.0, -1.5, 0.0})));
-  looks.course.waits = true;
+  looks.way.waits = true;
   std::vector<Evasion> first;
   std::vector<double> clearances;
   for (int i = 0; i < 20; ++i) {
@@ -314,7 +314,7 @@ TEST_CASE("ways do not lead through what stands still", "[hybrid][look]") {
   Looks open(task_with(Vector4d(1.0, 0.0, 0.0, 0.0), falling()));
   Looks shut(task_with(Vector4d(1.0, 0.0, 0.0, 0.0), falling(), {{{0.6, -0.2, 0.0}, 0.1}}));
   for (Looks* looks : {&open, &shut}) {
-    looks->course.waits = true;
+    looks->way.waits = true;
     looks->begin();
     (void)looks->run();
   }
@@ -334,8 +334,8 @@ TEST_CASE("a look does not allocate", "[hybrid][look][allocation]") {
   looks.shapes.place(looks.scene.model, looks.ws);
   CHECK(test::allocations_in([&] {
           if (!looks.look.is_near(looks.shapes.view(), 1)) return;
-          looks.look.begin(looks.q, looks.v, M, M, looks.course, looks.trail, looks.own, false,
-                           lead_s, 400);
+          looks.look.begin(looks.q, looks.v, M, M, looks.way, looks.trail, looks.own, false, lead_s,
+                           400);
           while (!looks.look.done()) looks.look.advance(7);
         }) == 0);
   CHECK(looks.look.units() > 60);
