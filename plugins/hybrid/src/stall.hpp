@@ -56,7 +56,7 @@ class StallWatch {
   explicit StallWatch(double stall_time_s) : detector_(stall_time_s) {}
   void set_stall_time(double seconds) noexcept { detector_.set_stall_time(seconds); }
   void forget_evasion() noexcept { evades_since_s_ = 0.0; }
-  /// Begins anew, on another course.
+  /// Begins again, on another course.
   void begin(double time_s) {
     detector_.restart(time_s);
     least_left_ = std::numeric_limits<double>::infinity();
