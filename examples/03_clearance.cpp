@@ -1,4 +1,4 @@
-// How near an arm is to the boards of a shelf and to itself, and which parts are the nearest.
+// How near an arm is to the boards of a shelf, and where.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -17,8 +17,7 @@ int main() {
     const auto near =
         std::min_element(contacts.begin(), contacts.end(),
                          [](const auto& a, const auto& b) { return a.distance < b.distance; });
-    fmt::print("{:.1f} rad: {:.6f} m to the shelf", 0.1 * step, near->distance);
-    fmt::print(" at height {:.3f} m, {:.6f} m to itself\n", near->obstacle_point.z(),
-               world.self_clearance_m());
+    fmt::print("{:.1f} rad: {:.6f} m, at height {:.3f} m\n", 0.1 * step, near->distance,
+               near->obstacle_point.z());
   }
 }

@@ -9,7 +9,9 @@
 int main(int, char** argv) {  // 07_control_loop FOLDER_OF_PLANNERS
   using namespace hamelin;
   const scene::Scene scene = scene::read_scene("data/scenes/clutter.json");
-  control::Controller controller(scene, {argv[1]});
+  control::Controller::Options options;
+  options.guide_thread = false;  // searches in this thread: the same result in each run
+  control::Controller controller(scene, {argv[1]}, options);
   const double period_s = controller.period_s();
 
   // A simulated arm, in place of the driver of your robot.
@@ -27,6 +29,7 @@ int main(int, char** argv) {  // 07_control_loop FOLDER_OF_PLANNERS
   for (int k = 0; k < 20000; ++k) {
     if (k == 100) controller.world().set_obstacle(ball);  // any thread may do this
     const control::Answer& answer = controller.tick(k * period_s, measured.q, measured.v);
+    controller.run_guide();
     clearance_m = std::min(clearance_m, controller.view().clearance_m());
     if (answer.state == control::ControlState::reached) {
       fmt::print("reached after {:.3f} s, clearance {:.6f} m at least\n", k * period_s,

@@ -4,7 +4,8 @@ import sys
 import hamelin
 
 scene = hamelin.load_scene("data/scenes/clutter.json")
-controller = hamelin.Controller(scene)
+# searches in this thread: the same result in each run
+controller = hamelin.Controller(scene, guide_thread=False)
 
 # A simulated arm, in place of the driver of your robot.
 robot = hamelin.Integrator(scene.model, "rk4")
@@ -18,6 +19,7 @@ for k in range(20000):
         controller.world.set_obstacle(ball)  # any thread may do this
     time_s = k * controller.period_s
     answer = controller.tick(time_s, measured.q, robot.velocity(measured))
+    controller.run_guide()
     clearance_m = min(clearance_m, controller.clearance_m)
     if answer.state == "reached":
         print(f"reached after {time_s:.3f} s, clearance {clearance_m:.6f} m at least")
