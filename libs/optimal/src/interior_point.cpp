@@ -34,7 +34,6 @@ InteriorPoint::InteriorPoint(Transcription& program, const SolveOptions& options
     : program_(program),
       options_(options),
       first_slack_(start.slack),
-      by_merit_(start.by_merit),
       mu_(start.mu),
       hessian_(program.hessian_matrix()),
       lower_{1.0, program.lower()},
@@ -160,7 +159,7 @@ void InteriorPoint::lower_barrier() {
   if (!can_lower_barrier()) return;
   const Errors now = errors(mu_);
   const bool solved = now.within(10.0 * mu_),
-             early = !by_merit_ && near_minimum_ && now.complementarity <= centred * mu_;
+             early = near_minimum_ && now.complementarity <= centred * mu_;
   if (!solved && !early && small_decreases_ < small_decreases_max) return;
   small_decreases_ = 0;
   near_minimum_ = false;
@@ -244,9 +243,8 @@ void InteriorPoint::count_small_decreases(const Filter::Point& before, const Fil
   const double decrease = before.cost - now.cost;
   near_minimum_ = decrease < gap_share * bounds_ * mu_ && now.violation <= before.violation &&
                   now.violation < small_violation;
-  const bool small = by_merit_ ? merit_.of(before) - merit_.of(now) < small_decrease * mu_
-                               : std::abs(decrease) < small_decrease * mu_ &&
-                                     before.violation - now.violation < small_decrease * mu_;
+  const bool small = std::abs(decrease) < small_decrease * mu_ &&
+                     before.violation - now.violation < small_decrease * mu_;
   small_decreases_ = small ? small_decreases_ + 1 : 0;
 }
 
@@ -259,11 +257,6 @@ void InteriorPoint::take_slacks(Side& side, const VectorXd& before, double step)
         inside >= least_share * before[r] ? inside : before[r] + step * side.slack_step[r];
   }
   find_residuals(side);
-}
-
-bool InteriorPoint::accepts(const Filter::Point& before, const Filter::Point& now, double slope,
-                            double step) {
-  return by_merit_ ? merit_.accept(before, now, step) : filter_.accept(before, now, slope, step);
 }
 
 // The iterate before trials that were all rejected: the program may be at one of them, which may
@@ -282,7 +275,6 @@ bool InteriorPoint::take_step() {
   const double slope = barrier_slope();
   cost_before_ = program_.cost();
   const Filter::Point before = filter_point();
-  merit_.begin(before, slope);
   double step = std::min(largest_step(lower_, lower_.slack, lower_.slack_step),
                          largest_step(upper_, upper_.slack, upper_.slack_step));
   bool accepted = false;
@@ -293,7 +285,7 @@ bool InteriorPoint::take_step() {
     take_slacks(lower_, slack_l, step);
     take_slacks(upper_, slack_u, step);
     const Filter::Point now = filter_point();
-    accepted = accepts(before, now, slope, step);
+    accepted = filter_.accept(before, now, slope, step);
     if (accepted) count_small_decreases(before, now);
   }
   if (!accepted) restore(x, slack_l, slack_u);

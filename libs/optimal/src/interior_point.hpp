@@ -1,7 +1,6 @@
 #pragma once
 #include "filter.hpp"
 #include "hamelin/optimal/solve.hpp"
-#include "merit.hpp"
 #include "transcription.hpp"
 
 namespace hamelin::optimal {
@@ -14,9 +13,6 @@ class InteriorPoint {
     /// Least slack at the guess, as a share of a bound: how far rows near their bounds may move in
     /// the first steps.
     double slack;
-    /// Steps by a merit instead of a filter, and the barrier is lowered only where its problem is
-    /// solved, or hardly any step decreases the merit.
-    bool by_merit = false;
   };
   InteriorPoint(Transcription& program, const SolveOptions& options, const Start& start);
   /// From x; the program is at the last iterate that was accepted afterwards.
@@ -63,8 +59,6 @@ class InteriorPoint {
   void restore(const VectorXd& x, const VectorXd& slack_l, const VectorXd& slack_u);
   [[nodiscard]] Filter::Point filter_point() const;
   [[nodiscard]] double barrier_slope() const;
-  [[nodiscard]] bool accepts(const Filter::Point& before, const Filter::Point& now, double slope,
-                             double step);
   void count_small_decreases(const Filter::Point& before, const Filter::Point& now);
   [[nodiscard]] double largest_step(const Side& side, const VectorXd& x, const VectorXd& dx) const;
   void keep_multipliers_near(Side& side) const;
@@ -82,7 +76,6 @@ class InteriorPoint {
   Transcription& program_;
   SolveOptions options_;
   double first_slack_;
-  bool by_merit_;
   double mu_;  ///< of the barrier
   BandedMatrix hessian_;
   Side lower_, upper_;
@@ -94,7 +87,6 @@ class InteriorPoint {
   double scale_ = 1.0;             ///< of the cost
   double cost_before_ = infinity;  ///< of the last step
   Filter filter_;
-  Merit merit_;
   double first_violation_ = 1.0;  ///< at the guess, at least 1
   double bounds_ = 0.0;           ///< number of those that do not rest at the guess
   bool near_minimum_ = false;     ///< whether the last step won little beside what μ leaves open

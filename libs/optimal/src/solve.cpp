@@ -44,9 +44,9 @@ bool better(double violation, double cost, double than_violation, double than_co
   return a < b || (a == b && cost < than_cost);
 }
 
-// From the same guess with other slacks if a minimum of the violation was found that is not zero.
-// The program is at the best of the minima afterwards. Among obstacles a large μ would centre the
-// motion between kinks of thousands of distances.
+// From the same guess with another μ or other slacks if a minimum of the violation was found that
+// is not zero. The program is at the best of the minima afterwards. Among obstacles a large μ would
+// centre the motion between kinks of thousands of distances.
 Solution solve_banded(Transcription& program, const VectorXd& guess, const SolveOptions& options,
                       bool obstacles) {
   Solution best;
@@ -56,9 +56,9 @@ Solution solve_banded(Transcription& program, const VectorXd& guess, const Solve
   using Start = InteriorPoint::Start;
   const std::array<Start, 4> starts{
       options.near_solution ? Start{1e-4, 0.01} : Start{obstacles ? 0.01 : 0.1, 1.0},
-      {0.1, 1.0, true},
-      {0.1, 0.01, true},
-      {0.1, 0.1, true}};
+      {obstacles ? 0.1 : 1.0, 1.0},
+      {0.1, 0.01},
+      {0.1, 0.1}};
   for (const Start& start : starts) {
     InteriorPoint solver(program, options, start);
     Solution found = solver.solve(guess);

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "../src/filter.hpp"
 #include "../src/interior_point.hpp"
-#include "../src/merit.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/optimal/solve.hpp"
@@ -35,21 +35,6 @@ TEST_CASE("a filter accepts less cost or less violation than all its points have
   // never much more violation than at the guess, nor a cost that is not finite
   CHECK_FALSE(filter.accept({0.0, 1.0}, {2e4, -1e9}, -0.1, 1.0));
   CHECK_FALSE(filter.accept({0.0, 1.0}, {0.0, std::nan("")}, -0.1, 1.0));
-}
-
-TEST_CASE("a merit accepts less violation for more cost, and keeps its penalty high enough",
-          "[optimal]") {
-  Merit merit;
-  const Merit::Point from{0.5, 1.0};
-  merit.begin(from, -0.1);
-  CHECK(merit.accept(from, {0.1, 1.3}, 1.0));  // 1.4 instead of 1.5
-  CHECK_FALSE(merit.accept(from, {0.1, 1.41}, 1.0));
-  // a step that costs 3 per violation is a descent with a larger penalty only
-  merit.begin(from, 1.5);
-  CHECK(merit.accept(from, {0.0, 2.5}, 1.0));
-  CHECK(merit.of({1.0, 0.0}) > 3.0);
-  CHECK_FALSE(merit.accept(from, {0.5, 1.0}, 1.0));
-  CHECK_FALSE(merit.accept(from, {0.0, std::nan("")}, 1.0));
 }
 
 TEST_CASE("active torque limits do not shorten the steps to the least time of a Panda",
