@@ -56,9 +56,9 @@ Solution solve_banded(Transcription& program, const VectorXd& guess, const Solve
   using Start = InteriorPoint::Start;
   const std::array<Start, 4> starts{
       options.near_solution ? Start{1e-4, 0.01} : Start{obstacles ? 0.01 : 0.1, 1.0},
-      {obstacles ? 0.1 : 1.0, 1.0},
+      {0.03, 0.01},
       {0.1, 0.01},
-      {0.1, 0.1}};
+      {0.1, obstacles ? 1.0 : 0.1}};
   for (const Start& start : starts) {
     InteriorPoint solver(program, options, start);
     Solution found = solver.solve(guess);
