@@ -200,6 +200,9 @@ SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& 
   return out;
 }
 
+// To how many seeds of the guide a motion is sought.
+constexpr int paths_max = 3;
+
 // Whether the guesses go along searched paths: where the scene says so, and where a goal of the tip
 // leaves open at which joint positions the arm ends.
 bool uses_paths(const scene::Scene& scene) {
@@ -224,10 +227,17 @@ SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& 
   control::World::Options near;
   near.influence_m = influence_of(options.margin_m);
   control::World world(scene, model, near);
-  const std::vector<MatrixXd> paths = guide_paths(scene, model, world);
   const control::WorldView shown(scene, model, world);
   control::WorldView all(scene, model, shown);
-  return optimize_along(scene, options, model, all, paths);
+  SceneMotion found =
+      optimize_along(scene, options, model, all, guide_paths(scene, model, world));
+  // Where the guess leads to kinks that are not left again, that along another path may not.
+  scene::Scene other = scene;
+  for (int k = 1; k < paths_max && !found.valid(); ++k) {
+    ++other.seed;
+    found = optimize_along(scene, options, model, all, guide_paths(other, model, world));
+  }
+  return found;
 }
 
 double SceneMotion::duration_s() const {

@@ -84,7 +84,8 @@ struct SceneMotion {
 
 /// Optimises the motion from the start of a scene to its first goal, and from each goal to the
 /// next, among the obstacles that stand still. The first guess goes along the paths of the scene's
-/// guide; without a guide along the goals' own paths, or straight.
+/// guide, and where none of them gives a valid motion, along those of the next two seeds; without a
+/// guide along the goals' own paths, or straight.
 /// @throws Error io, parse or invalid for bad input, a start or goal that is nearer to an obstacle
 ///         than the margin, a scene with damping or friction, goals of the
 ///         tip without a guide, goals that follow a target, or if the guide finds no path
