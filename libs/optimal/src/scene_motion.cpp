@@ -229,8 +229,7 @@ SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& 
   control::World world(scene, model, near);
   const control::WorldView shown(scene, model, world);
   control::WorldView all(scene, model, shown);
-  SceneMotion found =
-      optimize_along(scene, options, model, all, guide_paths(scene, model, world));
+  SceneMotion found = optimize_along(scene, options, model, all, guide_paths(scene, model, world));
   // Where the guess leads to kinks that are not left again, that along another path may not.
   scene::Scene other = scene;
   for (int k = 1; k < paths_max && !found.valid(); ++k) {
