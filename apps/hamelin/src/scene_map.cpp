@@ -96,9 +96,8 @@ scene::CropOptions crop_options(const CropFlags& flags) {
   if (flags.scene) {
     const scene::Scene scene = scene::read_scene(*flags.scene);
     if (!scene.map || scene.map->file.empty())
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: /map{}: is missing, expected a map to crop",
-                              flags.scene->string(), scene.map ? "/file" : ""));
+      throw Error(ErrorCode::invalid, fmt::format("{}: /map{}: is missing, expected a map to crop",
+                                                  flags.scene->string(), scene.map ? "/file" : ""));
     if (!flags.map) options.map = scene.map->file;
     options.read.scale = scene.map->scale;
     options.read.occupancy_threshold = scene.map->occupancy_threshold;

@@ -73,7 +73,8 @@ Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle
   map_pose_ = map->pose;
   map_pose_inverse_ = map->pose.inverse();
   map_ = std::make_shared<MapField>(region.occupied, region.resolution_m, region.reachable.center);
-  unknown_ = std::make_shared<MapField>(region.unknown, region.resolution_m, region.reachable.center);
+  unknown_ =
+      std::make_shared<MapField>(region.unknown, region.resolution_m, region.reachable.center);
   summary_.boxes = map_->boxes().boxes().size();
   summary_.unknown_boxes = unknown_->boxes().boxes().size();
   map_spec_ = map;

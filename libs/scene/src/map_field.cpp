@@ -136,8 +136,7 @@ void MapField::find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
   const auto sample = [&](double t) {
     BoxHit inside;
     const MapSurface::Nearest nearest = surface_->nearest(boxes_, at(t));
-    const double depth =
-        boxes_.nearest(at(t), 0.0, inside) ? nearest.distance : -nearest.distance;
+    const double depth = boxes_.nearest(at(t), 0.0, inside) ? nearest.distance : -nearest.distance;
     return Sample{t, depth, nearest.face};
   };
   const auto interval = [&](const Sample& left, const Sample& right) {

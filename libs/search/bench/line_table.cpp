@@ -153,9 +153,8 @@ struct Changes {
     std::vector<scene::VoxelBox> voxels;
     const double resolution_m = environment.summary().resolution_m;
     for (const auto* part : {&environment.map_field(), &environment.unknown_field()})
-      part->boxes().for_each_alive([&](const scene::Box& box) {
-        voxels.push_back(scene::to_voxels(box, resolution_m));
-      });
+      part->boxes().for_each_alive(
+          [&](const scene::Box& box) { voxels.push_back(scene::to_voxels(box, resolution_m)); });
     const auto fresh = scene::DistanceField::make(voxels, resolution_m);
     const auto kept = environment.distance_field();
     if (!fresh || !kept) return !fresh && !kept;

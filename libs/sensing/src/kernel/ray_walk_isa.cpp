@@ -70,8 +70,7 @@ void walk(const BoxRay* rays, std::size_t count, std::uint64_t* bits) noexcept {
       }
       Doubles nearest = r.next[0] < r.next[1] ? r.next[0] : r.next[1];
       nearest = nearest < r.next[2] ? nearest : r.next[2];
-      const Integers ended =
-          ((r.left & left_box) != 0) | (bit == r.end_bit) | (nearest > r.length);
+      const Integers ended = ((r.left & left_box) != 0) | (bit == r.end_bit) | (nearest > r.length);
       r.walks &= ~ended;
       r.bit = (bit & r.walks) | (r.bit & ~r.walks);  // that of a ray that has ended is set already
     }

@@ -246,8 +246,8 @@ typedef struct hamelin_point_frame {
   const float* points_m; /* x, y, z of each in the sensor's frame, finite */
   size_t points;         /* 1 to 2000000 */
   double position_m[3], quaternion_wxyz[4]; /* of the sensor, in the frame of its mount */
-  double time_s;  /* when they were seen, on the clock of hamelin_controller_tick */
-  double range_m; /* of points that are farther only the way up to there is free; 0: no bound */
+  double time_s;     /* when they were seen, on the clock of hamelin_controller_tick */
+  double range_m;    /* of points that are farther only the way up to there is free; 0: no bound */
   const char* frame; /* HAMELIN_MOUNT_FRAME: name of a link or fixed frame of the robot */
 } hamelin_point_frame;
 

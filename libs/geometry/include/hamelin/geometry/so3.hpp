@@ -20,8 +20,8 @@ namespace hamelin::geometry {
 /// @throws Error invalid unless its norm is 1 to within 1e-6
 [[nodiscard]] Eigen::Matrix3d rotation_from_wxyz(const Eigen::Vector4d& wxyz);
 
-/// The least rotation R that turns `from` to the direction of `to`. If they are opposite, the axis is
-/// some normal of `from`.
+/// The least rotation R that turns `from` to the direction of `to`. If they are opposite, the axis
+/// is some normal of `from`.
 /// @param from,to of any length but 0
 [[nodiscard]] Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from,
                                                const Eigen::Vector3d& to);

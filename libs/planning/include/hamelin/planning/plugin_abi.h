@@ -132,8 +132,8 @@ enum {
   HAMELIN_GOAL_FOLLOW = 3
 };
 
-/* What is known of a path to a goal: nobody has asked for one; it is being searched; it is there; none
- * was found. */
+/* What is known of a path to a goal: nobody has asked for one; it is being searched; it is there;
+ * none was found. */
 enum {
   HAMELIN_PATH_NOT_SOUGHT = 0,
   HAMELIN_PATH_SOUGHT = 1,
@@ -252,8 +252,8 @@ typedef struct hamelin_tick {
    * sent. They are those of the arm, whatever a shield did with the planner's torques. */
   const double* disturbance;
   /* What the tip keeps on the way to the goal, to first order: what is left of each tolerance, but
-   * for a reserve [rad or m], negative beyond that, and its derivative by q, dof numbers each. A path
-   * to the goal keeps them; a planner that leaves it should. */
+   * for a reserve [rad or m], negative beyond that, and its derivative by q, dof numbers each. A
+   * path to the goal keeps them; a planner that leaves it should. */
   size_t kept_count;
   const double *kept_slack, *kept_gradient;
 } hamelin_tick;
@@ -397,13 +397,14 @@ typedef struct hamelin_host {
    * log and report, such as the path of the tip that the planner considers. The lines of a tick
    * are drawn together, until a later tick draws others. */
   void (*draw_path)(void* context, const double* points_world_m, size_t count);
-  /* [tick, inside tick only] Asks for a collision-free path to the current goal. Returns 1 if it will
-   * be searched, and 0 if there is no search or it has been asked too often at this goal. If it is
-   * 1, later ticks have another goal in place of the current one: at first a joint goal where the
-   * arm is, so that it waits there; then a joint goal with the path, or the goal itself if none was
-   * found. hamelin_goal.path_search says which. A goal that follows a target stays, and its path leads
-   * to where the target was. Paths follow the map: where it changes, what is left of a path is
-   * proved again, or searched again. Only planners with the property HAMELIN_ASKS_FOR_PATHS may ask. */
+  /* [tick, inside tick only] Asks for a collision-free path to the current goal. Returns 1 if it
+   * will be searched, and 0 if there is no search or it has been asked too often at this goal. If
+   * it is 1, later ticks have another goal in place of the current one: at first a joint goal where
+   * the arm is, so that it waits there; then a joint goal with the path, or the goal itself if none
+   * was found. hamelin_goal.path_search says which. A goal that follows a target stays, and its
+   * path leads to where the target was. Paths follow the map: where it changes, what is left of a
+   * path is proved again, or searched again. Only planners with the property HAMELIN_ASKS_FOR_PATHS
+   * may ask. */
   int32_t (*request_path)(void* context);
 } hamelin_host;
 
@@ -421,7 +422,8 @@ enum {
   HAMELIN_FOLLOWS_TRAJECTORIES = 16, /* it accepts joint goals with a trajectory */
   HAMELIN_ASKS_FOR_PATHS = 32,       /* it calls hamelin_host.request_path, if it needs paths */
   /* Near points are no matter to it while it follows a certified reference: where nothing moves and
-   * the arm was within HAMELIN_ON_PATH of it, ticks list none. Functions that find them still do. */
+   * the arm was within HAMELIN_ON_PATH of it, ticks list none. Functions that find them still do.
+   */
   HAMELIN_TRUSTS_CERTIFIED_PATHS = 64
 };
 

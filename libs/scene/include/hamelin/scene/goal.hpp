@@ -92,14 +92,14 @@ struct Goal {
   std::optional<double> tip_speed_max_m_s;  ///< position, pose: of the tip at arrival
   /// Reached at any speed: the arm may pass it on the way to the next goal.
   bool passes = false;
-  bool position_only = false;               ///< follow: whether the orientation is free
-  std::optional<Motion> motion;             ///< follow: of the target; none: it is streamed
-  TargetStream stream;                      ///< follow without a motion
-  Allowance may_touch;                      ///< while this goal is the current one
-  std::optional<TipWay> way;                ///< position, pose: of the tip; none: any
-  std::optional<Stretch> approach;          ///< joint, pose: the last stretch of the way
-  std::optional<Stretch> retreat;           ///< the first stretch of the way
-  std::vector<TipConstraint> constraints;   ///< kept on the way to it; at most constraints_max
+  bool position_only = false;              ///< follow: whether the orientation is free
+  std::optional<Motion> motion;            ///< follow: of the target; none: it is streamed
+  TargetStream stream;                     ///< follow without a motion
+  Allowance may_touch;                     ///< while this goal is the current one
+  std::optional<TipWay> way;               ///< position, pose: of the tip; none: any
+  std::optional<Stretch> approach;         ///< joint, pose: the last stretch of the way
+  std::optional<Stretch> retreat;          ///< the first stretch of the way
+  std::vector<TipConstraint> constraints;  ///< kept on the way to it; at most constraints_max
 };
 
 /// The goals one of which is to be reached: those of any_of, else the goal itself.

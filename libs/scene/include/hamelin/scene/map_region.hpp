@@ -25,8 +25,8 @@ enum class UnknownPolicy : std::int32_t { free, slow, block };
 struct PointsSpec {
   /// Points this near to the arm, its load or a known obstacle are left out.
   double margin_m = 0.03;
-  double time_error_s = 0.0;   ///< by which the time of a frame may be wrong, either way
-  double age_max_s = 0.5;      ///< frames that come later after they were seen are refused
+  double time_error_s = 0.0;  ///< by which the time of a frame may be wrong, either way
+  double age_max_s = 0.5;     ///< frames that come later after they were seen are refused
   /// Whether bodies that move are followed, and become obstacles instead of voxels.
   bool movers = true;
   /// Whether single unknown voxels between free ones count as free.

@@ -8,8 +8,8 @@
 
 namespace hamelin::scene {
 
-/// What carries a depth sensor: the world, the robot's base, which stands in it, the tip, or a frame
-/// with a name.
+/// What carries a depth sensor: the world, the robot's base, which stands in it, the tip, or a
+/// frame with a name.
 enum class Mount : std::int32_t { world, base, tip, frame };
 
 [[nodiscard]] std::string_view to_string(Mount mount) noexcept;

@@ -23,8 +23,8 @@ class Curve {
   void add(const Curve& curve);
   /// The part between two places, with its parameter from 0 on.
   [[nodiscard]] Curve part(double from, double to) const;
-  /// A place itself if it is on a straight piece; else the first end of a piece behind it at which q″
-  /// is zero, or the end of the curve.
+  /// A place itself if it is on a straight piece; else the first end of a piece behind it at which
+  /// q″ is zero, or the end of the curve.
   [[nodiscard]] double next_straight(double from) const;
   /// Appends a piece. @param coefficients dof × (degree + 1): of (σ − its beginning)^k
   void add(double length, const Eigen::MatrixXd& coefficients);
