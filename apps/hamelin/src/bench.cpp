@@ -61,7 +61,7 @@ struct DrawFlags {
 
 // A set that ships, by its name, or a file.
 fs::path set_file(const std::optional<fs::path>& given) {
-  const fs::path name = given.value_or("v1");
+  fs::path name = given.value_or("v1");
   if (name.has_extension() || name.has_parent_path()) return name;
   return prefix().value_or("/") / "share" / "hamelin" / "bench" / (name.string() + ".json");
 }

@@ -105,7 +105,7 @@ class Prover {
 
   // From a node from which the view departed. Returns the end, from which it departed then.
   Node prove_piece(const Node& from, double to, int bisections) {
-    const Node end = look(to);
+    Node end = look(to);
     // a velocity that grows from zero to this one strays as much as an acceleration of this size
     v_ = 0.5 * motion_.step_s * (to - from.place) * from.a.cwiseAbs().cwiseMax(end.a.cwiseAbs());
     const auto verdict = view_.certify(end.q, v_);

@@ -61,7 +61,7 @@ class InterruptScope {
   [[nodiscard]] static InterruptCheck* current() noexcept { return current_; }
 
  private:
-  static inline thread_local InterruptCheck* current_ = nullptr;
+  static inline thread_local InterruptCheck* current_ = nullptr;  // NOLINT: a member
   InterruptCheck* before_;
 };
 

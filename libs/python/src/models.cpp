@@ -172,8 +172,8 @@ py::array_t<double> crba(BoundModel& bound, py::handle q) {
 // Energies of one state are numbers, of many states arrays.
 template <class F>
 py::object energies(BoundModel& bound, const States& in, const F& energy) {
-  const auto out = for_each_state(bound, in, {},
-                                  [&](auto& ws, py::ssize_t i, double* y) { *y = energy(ws, i); });
+  auto out = for_each_state(bound, in, {},
+                            [&](auto& ws, py::ssize_t i, double* y) { *y = energy(ws, i); });
   if (in.single()) return py::float_(*out.data());
   return out;
 }

@@ -57,6 +57,7 @@ PYBIND11_MODULE(_hamelin, module) {
   using namespace hamelin;
   namespace py = pybind11;
   module.doc() = "The extension module of hamelin; use the package hamelin.";
+  // NOLINTNEXTLINE(performance-unnecessary-value-param): the signature is pybind11's
   py::register_local_exception_translator([](std::exception_ptr error) {
     try {
       if (error) std::rethrow_exception(error);

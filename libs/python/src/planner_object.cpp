@@ -47,7 +47,7 @@ bool python_runs() noexcept {
 // The class that influence_m() has loaded for create(), which follows on the same thread. If no
 // create() follows, it is destroyed at the end of the thread, which does not hold Python's lock.
 struct Loaded {
-  Loaded(Json params_, py::object type_) : params(std::move(params_)), type(std::move(type_)) {}
+  Loaded(Json given, py::object of) : params(std::move(given)), type(std::move(of)) {}
   Loaded(const Loaded&) = delete;
   Loaded& operator=(const Loaded&) = delete;
   ~Loaded() {

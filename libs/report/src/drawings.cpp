@@ -12,7 +12,8 @@ void Drawings::add(double time_s, const std::vector<std::vector<double>>& lines)
   t_.push_back(time_s);
   lines_.push_back(static_cast<double>(lines.size()));
   for (const auto& line : lines) {
-    points_.push_back(static_cast<double>(line.size() / 3));
+    const std::size_t points = line.size() / 3;
+    points_.push_back(static_cast<double>(points));
     position_.insert(position_.end(), line.begin(), line.end());
   }
 }

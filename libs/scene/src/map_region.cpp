@@ -104,7 +104,8 @@ std::vector<Cell> cells_around(const Ball& ball, double resolution) {
   for (std::size_t i = 0; i < 3; ++i) {
     const double cell = edge * resolution, center = ball.center[static_cast<Eigen::Index>(i)];
     const auto at = [&](double x) {
-      const double most = tree_half / edge;
+      constexpr std::int32_t cells = tree_half / edge;
+      constexpr double most = cells;
       return static_cast<std::int32_t>(std::clamp(std::floor(x / cell), -most, most - 1.0));
     };
     lo[i] = at(center - ball.radius);

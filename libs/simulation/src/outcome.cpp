@@ -54,8 +54,8 @@ void ClosedLoop::check_outcome() {
 
 std::string ClosedLoop::timeout_cause() const {
   const std::string_view no_path = controller_->guide_cause();
-  const std::string cause = fmt::format("goal not reached within {} s{}{}", scene_.duration_s,
-                                        no_path.empty() ? "" : ", no path: ", no_path);
+  std::string cause = fmt::format("goal not reached within {} s{}{}", scene_.duration_s,
+                                  no_path.empty() ? "" : ", no path: ", no_path);
   const auto shield = controller_->shield_report();
   if (!shield || !shield->stopping || !shield->at_rest) return cause;
   control::LineBuffer line;

@@ -127,7 +127,7 @@ void Recorder::event(double time_s, const std::string& text, const Json& more) {
   if (watch_.log == nullptr) return;
   Json fields{{"time_s", time_s}, {"text", text}};
   fields.update(more);
-  watch_.log->write("event", std::move(fields));
+  watch_.log->write("event", fields);
 }
 
 void Recorder::close(const Ledger& ledger) {

@@ -3,6 +3,7 @@
 
 // What an instruction set contributes to a selection: the declaration of its object, and the branch
 // that returns it. A build without the set (HAMELIN_INSTRUCTION_SETS) has neither.
+// NOLINTBEGIN(bugprone-macro-parentheses): names and declarations
 #define HAMELIN_DECLARE_KERNELS(space, Set, name) \
   space {                                         \
     extern const Set name;                        \
@@ -32,6 +33,7 @@
 #define HAMELIN_RETURN_V4(isa, name) \
   if (isa == Isa::v4) return isa_v4::name;
 #endif
+// NOLINTEND(bugprone-macro-parentheses)
 
 /// Defines `const Set& select_NAME(Isa)`, which returns the object NAME compiled for that
 /// instruction set. A source under hamelin_isa_sources defines one such object per set. Use the
