@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "hamelin/control/plan_paths.hpp"
 #include "hamelin/control/planner_setup.hpp"
@@ -135,13 +136,8 @@ Problem problem_of(const scene::Scene& scene, const SceneMotionOptions& options,
 
 namespace {
 
-// The paths of the scene's guide, along which the guesses go.
-std::vector<MatrixXd> guide_paths(const scene::Scene& scene, const model::Model& arm,
-                                  control::World& world) {
-  const control::PathPlan plan = control::plan_paths(scene, arm, world);
-  if (!plan.found())
-    refuse_scene(scene, fmt::format("/goals/{}: no path was found: {}", plan.goals.size() - 1,
-                                    plan.goals.back().path.cause));
+// The paths along which the guesses go.
+std::vector<MatrixXd> paths_of(const control::PathPlan& plan) {
   std::vector<MatrixXd> paths;
   for (const auto& goal : plan.goals) paths.push_back(goal.path.points);
   return paths;
@@ -200,8 +196,8 @@ SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& 
   return out;
 }
 
-// To how many seeds of the guide a motion is sought.
-constexpr int paths_max = 3;
+// With how many seeds of the guide a motion is sought.
+constexpr int seeds_max = 3;
 
 // Whether the guesses go along searched paths: where the scene says so, and where a goal of the tip
 // leaves open at which joint positions the arm ends.
@@ -229,12 +225,23 @@ SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& 
   control::World world(scene, model, near);
   const control::WorldView shown(scene, model, world);
   control::WorldView all(scene, model, shown);
-  SceneMotion found = optimize_along(scene, options, model, all, guide_paths(scene, model, world));
+  const control::PathPlan plan = control::plan_paths(scene, model, world);
+  if (!plan.found())
+    refuse_scene(scene, fmt::format("/goals/{}: no path was found: {}", plan.goals.size() - 1,
+                                    plan.goals.back().path.cause));
+  SceneMotion found = optimize_along(scene, options, model, all, paths_of(plan));
   // Where the guess leads to kinks that are not left again, that along another path may not.
   scene::Scene other = scene;
-  for (int k = 1; k < paths_max && !found.valid(); ++k) {
+  for (int k = 1; k < seeds_max && !found.valid(); ++k) {
     ++other.seed;
-    found = optimize_along(scene, options, model, all, guide_paths(other, model, world));
+    const control::PathPlan next = control::plan_paths(other, model, world);
+    if (!next.found()) continue;
+    try {
+      SceneMotion tried = optimize_along(scene, options, model, all, paths_of(next));
+      if (tried.valid()) found = std::move(tried);
+    } catch (const Error& e) {  // its end, for a goal of the tip, is nearer than the margin
+      if (e.code() != ErrorCode::invalid) throw;
+    }
   }
   return found;
 }

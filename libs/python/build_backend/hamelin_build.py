@@ -26,7 +26,7 @@ except ImportError:  # before Python 3.11
     from pip._vendor import tomli as tomllib  # type: ignore
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-# The program's commands in a wheel. What the others do, the package does as functions.
+# The program's commands in a wheel. The package has functions for most of what the others do.
 COMMANDS = ("run", "replay", "report", "plan", "scene", "plugins", "schema", "help")
 
 
