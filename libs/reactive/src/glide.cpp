@@ -14,7 +14,7 @@ constexpr double touching_m = -0.002;
 
 }  // namespace
 
-Glide::Glide(const planning::Setup& setup, const model::Model& model, const Margins& margins,
+Glide::Glide(const planning::Setup& setup, const model::Model& model, const PointMargins& margins,
              Surroundings& surroundings)
     : setup_(setup),
       model_(model),

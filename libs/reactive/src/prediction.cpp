@@ -24,7 +24,8 @@ LawParams ahead(LawParams law) {
 }  // namespace
 
 Prediction::Prediction(const planning::Setup& setup, const model::Model& model,
-                       const LawParams& law, const Margins& margins, Surroundings& surroundings)
+                       const LawParams& law, const PointMargins& margins,
+                       Surroundings& surroundings)
     : model_(model),
       law_(setup, model, ahead(law)),
       params_(law),

@@ -33,7 +33,7 @@ TurnKinds turn_kinds(std::string_view name) {
 }
 
 Steering::Steering(const planning::Host& host, const planning::Setup& setup,
-                   const model::Model& model, const LawParams& law, const Margins& margins,
+                   const model::Model& model, const LawParams& law, const PointMargins& margins,
                    const SteeringParams& params)
     : setup_(setup),
       surroundings_(host, setup),

@@ -8,14 +8,9 @@
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/payload.hpp"
 #include "loop/loaded_arm.hpp"
+#include "scene_places.hpp"
 
 namespace hamelin::simulation {
-
-namespace {
-
-constexpr double time_rounding_s = 1e-9;
-
-}  // namespace
 
 bool ClosedLoop::is_due(const scene::Event& event) const {
   return event.time_s ? *event.time_s <= plant_->node().time_s + time_rounding_s

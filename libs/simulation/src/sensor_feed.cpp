@@ -8,23 +8,18 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/dynamics/frames.hpp"
+#include "scene_places.hpp"
 
 namespace hamelin::simulation {
 
 namespace {
 
-constexpr double time_rounding_s = 1e-9;
 // Noise of other parts of a run comes from the seed itself.
 constexpr std::uint64_t noise_stream = 0x5e2501;
 
 // The index of a camera's frame; 0 without one.
 int frame_of(const scene::SensorSpec& spec, const model::Model& model, const std::string& place) {
-  if (spec.mount != scene::Mount::frame) return 0;
-  try {
-    return model.frame(spec.frame);
-  } catch (const Error& e) {
-    throw Error(ErrorCode::invalid, fmt::format("{}: {}", place, e.what()));
-  }
+  return spec.mount == scene::Mount::frame ? named_frame(model, spec.frame, place) : 0;
 }
 
 }  // namespace

@@ -5,15 +5,9 @@
 
 #include <limits>
 
-#include "hamelin/core/error.hpp"
+#include "scene_places.hpp"
 
 namespace hamelin::simulation {
-
-namespace {
-
-constexpr double step_rounding_s = 1e-9;
-
-}  // namespace
 
 WrenchFeed::WrenchFeed(const std::vector<scene::WrenchSpec>& given, const model::Model& model,
                        const std::string& place) {
@@ -25,11 +19,7 @@ WrenchFeed::WrenchFeed(const std::vector<scene::WrenchSpec>& given, const model:
               spec.to_s.value_or(std::numeric_limits<double>::infinity())};
     if (!spec.frame.empty()) {
       out.name = spec.frame;
-      try {
-        out.wrench.frame = model.frame(spec.frame);
-      } catch (const Error& e) {
-        throw Error(ErrorCode::invalid, fmt::format("{}/{}/frame: {}", place, i, e.what()));
-      }
+      out.wrench.frame = named_frame(model, spec.frame, fmt::format("{}/{}/frame", place, i));
     }
     out.wrench.reference = spec.reference;
     out.wrench.wrench << spec.moment_Nm, spec.force_N;
@@ -41,8 +31,8 @@ WrenchFeed::WrenchFeed(const std::vector<scene::WrenchSpec>& given, const model:
 bool WrenchFeed::advance(double time_s) {
   bool changed = false;
   for (Timed& each : all_) {
-    const bool acts =
-        each.from_s <= time_s + step_rounding_s && time_s + step_rounding_s < each.to_s;
+    const double until_s = time_s + time_rounding_s;
+    const bool acts = each.from_s <= until_s && until_s < each.to_s;
     changed = changed || acts != each.acts;
     each.acts = acts;
   }

@@ -5,7 +5,7 @@
 #include "hamelin/planning/plugin.hpp"
 #include "hamelin/reactive/filter_drive.hpp"
 #include "hamelin/reactive/law.hpp"
-#include "hamelin/reactive/margins.hpp"
+#include "hamelin/reactive/point_margins.hpp"
 #include "hamelin/reactive/rest_rule.hpp"
 #include "hamelin/reactive/steering.hpp"
 
@@ -32,7 +32,7 @@ class PredictedTurn final : public planning::Planner {
   reactive::Law law_;
   reactive::FilterDrive drive_;
   reactive::Surroundings surroundings_;
-  reactive::Margins margins_;
+  reactive::PointMargins margins_;
   std::optional<reactive::Steering> steering_;  ///< none with turns none
   reactive::RestRule rest_;                     ///< without steering
   Eigen::VectorXd u_;

@@ -16,7 +16,7 @@ constexpr Eigen::Index trail_points = 512;
 }  // namespace
 
 Evader::Evader(const planning::Host& host, const planning::Setup& setup, const model::Model& model,
-               Law& law, const Margins& margins)
+               Law& law, const PointMargins& margins)
     : model_(model),
       period_s_(setup.control_period_s()),
       look_ticks_(std::max<std::uint64_t>(

@@ -14,7 +14,7 @@ namespace hamelin::hybrid {
 class Evader {
  public:
   Evader(const planning::Host& host, const planning::Setup& setup, const model::Model& model,
-         Law& law, const Margins& margins);
+         Law& law, const PointMargins& margins);
   /// @param budget configurations that a look examines @param steps of them per tick, at least so
   ///        many that the look ends in time
   void set_params(const LookAheadParams& params, int budget, int steps) noexcept;

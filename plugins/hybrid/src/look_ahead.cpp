@@ -28,7 +28,7 @@ constexpr double far_m = 1.0;                     // distances beyond this are n
 }  // namespace
 
 LookAhead::LookAhead(const planning::Setup& setup, const model::Model& model, Law& law,
-                     const Margins& margins, const planning::Host& host)
+                     const PointMargins& margins, const planning::Host& host)
     : setup_(setup),
       model_(model),
       law_(law),

@@ -46,7 +46,7 @@ class LookAhead {
 
   /// All must outlive this, but for the host.
   LookAhead(const planning::Setup& setup, const model::Model& model, Law& law,
-            const Margins& margins, const planning::Host& host);
+            const PointMargins& margins, const planning::Host& host);
   void set_params(const LookAheadParams& params) noexcept { params_ = params; }
   void reset();
 
@@ -85,7 +85,7 @@ class LookAhead {
   const planning::Setup& setup_;
   const model::Model& model_;
   Law& law_;
-  const Margins& margins_;
+  const PointMargins& margins_;
   Surroundings surroundings_;
   Movers movers_;  ///< of the look
   Trail trail_;    ///< of the look

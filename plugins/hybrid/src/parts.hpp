@@ -1,9 +1,9 @@
 #pragma once
 #include "hamelin/reactive/filter_drive.hpp"
 #include "hamelin/reactive/law.hpp"
-#include "hamelin/reactive/margins.hpp"
 #include "hamelin/reactive/movers.hpp"
 #include "hamelin/reactive/obstacles.hpp"
+#include "hamelin/reactive/point_margins.hpp"
 #include "hamelin/reactive/safety_filter.hpp"
 #include "hamelin/reactive/steering.hpp"
 #include "hamelin/reactive/surroundings.hpp"

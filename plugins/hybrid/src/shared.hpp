@@ -84,7 +84,7 @@ struct Shared {
   Law law;
   FilterDrive drive;
   Surroundings surroundings;
-  Margins margins;
+  PointMargins margins;
   Evader evader;
   std::unique_ptr<Steering> steering;  ///< null: the desired velocity is not turned
   StallWatch stall;

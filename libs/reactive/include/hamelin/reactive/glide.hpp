@@ -1,6 +1,6 @@
 #pragma once
-#include "hamelin/reactive/margins.hpp"
 #include "hamelin/reactive/obstacles.hpp"
+#include "hamelin/reactive/point_margins.hpp"
 #include "hamelin/reactive/safety_filter.hpp"
 #include "hamelin/reactive/surroundings.hpp"
 
@@ -15,7 +15,7 @@ class Glide {
   static constexpr double radius_m = 0.07;  ///< obstacles beyond this distance are ignored
 
   /// @param surroundings kept by reference, as are model and margins
-  Glide(const planning::Setup& setup, const model::Model& model, const Margins& margins,
+  Glide(const planning::Setup& setup, const model::Model& model, const PointMargins& margins,
         Surroundings& surroundings);
 
   /// Goes to a configuration and finds what is near.
@@ -39,7 +39,7 @@ class Glide {
 
   const planning::Setup setup_;
   const model::Model& model_;
-  const Margins& margins_;
+  const PointMargins& margins_;
   Surroundings& surroundings_;
   dynamics::Workspace ws_;
   Obstacles obstacles_;

@@ -13,7 +13,7 @@ class Prediction {
  public:
   /// All are kept by reference.
   Prediction(const planning::Setup& setup, const model::Model& model, const LawParams& law,
-             const Margins& margins, Surroundings& surroundings);
+             const PointMargins& margins, Surroundings& surroundings);
   void set_params(const LawParams& law) noexcept;
 
   /// @param turn copied @param moving whether obstacles move

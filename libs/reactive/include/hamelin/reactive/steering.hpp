@@ -24,7 +24,7 @@ struct SteeringParams {
 class Steering {
  public:
   Steering(const planning::Host& host, const planning::Setup& setup, const model::Model& model,
-           const LawParams& law, const Margins& margins, const SteeringParams& params);
+           const LawParams& law, const PointMargins& margins, const SteeringParams& params);
   void set_params(const LawParams& law) noexcept {
     cruise_speed_ = law.cruise_speed;
     prediction_.set_params(law);

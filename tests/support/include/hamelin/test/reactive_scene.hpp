@@ -8,7 +8,7 @@
 
 #include "hamelin/geometry/se3.hpp"
 #include "hamelin/planning/plugin_host.hpp"
-#include "hamelin/reactive/margins.hpp"
+#include "hamelin/reactive/point_margins.hpp"
 #include "hamelin/reactive/surroundings.hpp"
 #include "hamelin/scene/obstacles.hpp"
 #include "hamelin/test/arm_loop.hpp"
@@ -281,7 +281,7 @@ class ReactiveScene {
  public:
   const planning::Setup setup;
   reactive::Surroundings surroundings;
-  reactive::Margins margins;
+  reactive::PointMargins margins;
 };
 
 /// A ball that is at a place at time 0 and keeps its velocity.

@@ -1,4 +1,4 @@
-#include "hamelin/reactive/margins.hpp"
+#include "hamelin/reactive/point_margins.hpp"
 
 #include <algorithm>
 
@@ -26,7 +26,7 @@ MarginParams margins_in_scene(const planning::Setup& setup, MarginParams wanted)
   return wanted;
 }
 
-Margins::Margins(const planning::Setup& setup, const MarginParams& params)
+PointMargins::PointMargins(const planning::Setup& setup, const MarginParams& params)
     : params_(params),
       smallest_m_(setup.sampled() ? smallest_sampled_m : smallest_m),
       least_m_(std::max(smallest_m, setup.shield_margin_m() + least_beyond_shield_m)),
@@ -35,7 +35,7 @@ Margins::Margins(const planning::Setup& setup, const MarginParams& params)
       self_at_goal_(params.self_m),
       clearance_at_goal_(setup.shapes().size()) {}
 
-void Margins::set_goal(Surroundings& surroundings, const hamelin_goal& goal, double radius) {
+void PointMargins::set_goal(Surroundings& surroundings, const hamelin_goal& goal, double radius) {
   joint_goal_ = goal.type == HAMELIN_GOAL_JOINT;
   std::fill(clearance_at_goal_.begin(), clearance_at_goal_.end(), radius);
   self_at_goal_ = params_.self_m;
@@ -51,7 +51,7 @@ void Margins::set_goal(Surroundings& surroundings, const hamelin_goal& goal, dou
         std::min(self_at_goal_, std::max(smallest_m_, contact.distance_m - params_.slack_m));
 }
 
-double Margins::at_goal(const NearPoint& point) const {
+double PointMargins::at_goal(const NearPoint& point) const {
   if (point.obstacle == NearPoint::self) return self_at_goal_;
   if (!joint_goal_) return params_.goal_m;
   const double remaining =
@@ -59,19 +59,19 @@ double Margins::at_goal(const NearPoint& point) const {
   return std::min(params_.full_m, std::max(smallest_m_, remaining));
 }
 
-void Margins::set(std::span<NearPoint> points, double weight) const {
+void PointMargins::set(std::span<NearPoint> points, double weight) const {
   for (auto& point : points) {
     const double full = point.obstacle == NearPoint::self ? params_.self_m : params_.full_m;
     point.margin = (1.0 - weight) * at_goal(point) + weight * full;
   }
 }
 
-void Margins::set_least(std::span<NearPoint> points) const {
+void PointMargins::set_least(std::span<NearPoint> points) const {
   for (auto& point : points)
     point.margin = point.obstacle == NearPoint::self ? least_self_m_ : least_m_;
 }
 
-bool Margins::tight_at_goal(const NearPoint& point) const {
+bool PointMargins::tight_at_goal(const NearPoint& point) const {
   if (point.obstacle == NearPoint::self) return self_at_goal_ < params_.self_m;
   return joint_goal_ && clearance_at_goal_[static_cast<std::size_t>(point.shape)] < params_.full_m;
 }

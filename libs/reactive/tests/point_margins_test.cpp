@@ -1,4 +1,4 @@
-#include "hamelin/reactive/margins.hpp"
+#include "hamelin/reactive/point_margins.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -8,8 +8,8 @@ using namespace hamelin;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
-using reactive::Margins;
 using reactive::NearPoint;
+using reactive::PointMargins;
 
 namespace {
 
@@ -20,7 +20,7 @@ NearPoint of_sphere(int sphere, double distance = 0.05) {
   return point;
 }
 
-double margin(const Margins& margins, NearPoint point, double weight) {
+double margin(const PointMargins& margins, NearPoint point, double weight) {
   margins.set({&point, 1}, weight);
   return point.margin;
 }

@@ -22,9 +22,9 @@ struct MarginParams {
 /// something than the arm should come elsewhere. At a joint goal the margin of a shape is its
 /// clearance there less `slack_m`, at least 1 mm (3 mm if actuation is sampled) and at most the
 /// full margin. At a goal of the tip it is `goal_m`.
-class Margins {
+class PointMargins {
  public:
-  Margins(const planning::Setup& setup, const MarginParams& params);
+  PointMargins(const planning::Setup& setup, const MarginParams& params);
   /// To be followed by set_goal().
   void set_params(const MarginParams& params) noexcept { params_ = params; }
   /// Measures the clearances at the goal. @param radius clearances up to this one are measured [m]
