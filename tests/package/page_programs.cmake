@@ -2,8 +2,7 @@
 #   -P page_programs.cmake
 # Builds the programs of `page` against the install `stage` and runs each with the file or folder
 # `argument` of the install and the folder of its planners. The page must contain the sources in
-# `source` and the lines of its CMakeLists.txt from the third on; the output of each program must
-# match `expected`.
+# `source` and its CMakeLists.txt; the output of each program must match `expected`.
 file(READ "${page}" text)
 file(GLOB sources "${source}/*.c" "${source}/*.cpp")
 foreach(file IN LISTS sources)
@@ -15,12 +14,10 @@ foreach(file IN LISTS sources)
     message(FATAL_ERROR "${page}: does not contain ${file}")
   endif()
 endforeach()
-file(STRINGS "${source}/CMakeLists.txt" lines)
-list(SUBLIST lines 2 -1 lines)
-list(JOIN lines "\n" lines)
-string(FIND "${text}" "```cmake\n${lines}\n```\n" at)
+file(READ "${source}/CMakeLists.txt" lines)
+string(FIND "${text}" "```cmake\n${lines}```\n" at)
 if(at EQUAL -1)
-  message(FATAL_ERROR "${page}: its CMake lines are not those of ${source}/CMakeLists.txt")
+  message(FATAL_ERROR "${page}: does not contain ${source}/CMakeLists.txt")
 endif()
 
 file(REMOVE_RECURSE "${binary}")

@@ -76,8 +76,8 @@ int verify(const ReplayOptions& options, const simulation::Recorded& recorded) {
     note(fmt::format("{}: {}", options.file.string(), line));
   if (!recorded.other_build.empty() && !options.tolerance)
     note(fmt::format(
-        "another build or machine: compared within {:g} times max(1, |logged|), not bit for bit; "
-        "the runs may differ from a decision on that depends on rounding",
+        "another build or machine: a difference up to {:g} times max(1, |logged|) is accepted; the "
+        "runs may differ from a decision on that depends on rounding",
         tolerance));
   simulation::Watch watch;
   watch.stop = &stop_on_signals();

@@ -86,6 +86,29 @@ void print(const fit::SelfCheck& check, const model::Robot& robot,
   report(text);
 }
 
+// What was written, and the pairs in it that were checked before. One that is rarely in contact may
+// be a real collision of the rest pose.
+std::string written_text(const RobotCheckFlags& flags, const fit::SelfCheck& check) {
+  constexpr double rare_share = 0.5;
+  const auto disabled = check.disabled(flags.never);
+  std::string text = fmt::format("wrote {}: {} pairs are not checked with it\n",
+                                 flags.output->string(), disabled.size());
+  for (const auto& pair : check.pairs) {
+    const auto entry =
+        std::find_if(disabled.begin(), disabled.end(), [&](const description::DisabledPair& d) {
+          return d.link_a == pair.part_a && d.link_b == pair.part_b;
+        });
+    if (!pair.checked || entry == disabled.end()) continue;
+    const bool rare = pair.touches_at_rest() && pair.contacts < rare_share * check.samples;
+    text += fmt::format("  added: {} - {}: {}; {}{}\n", pair.part_a, pair.part_b, entry->reason,
+                        contact_frequency(pair, check.samples),
+                        rare ? "; a real collision of the rest pose? Then take the pair out of the "
+                               "file, and start elsewhere"
+                             : "");
+  }
+  return text;
+}
+
 // The list of disabled pairs as an SRDF, or in a copy of the given sidecar.
 std::string list_text(const RobotCheckFlags& flags, const fit::SelfCheck& check,
                       const model::Robot& robot) {
@@ -122,6 +145,7 @@ int run(const RobotCheckFlags& flags) {
     print_json(fit::to_json(check, robot));
   else
     print(check, robot, flags.file);
+  if (flags.output && !flags.json) report(written_text(flags, check));
   return check.contacts_at_rest().empty() ? 0 : 1;
 }
 

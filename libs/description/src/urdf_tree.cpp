@@ -55,7 +55,8 @@ class Builder {
   void choose_tip(const std::optional<std::string>& tip) {
     if (!tip && leaves_.size() != 1)
       fail(ErrorCode::invalid, where_, 0,
-           fmt::format("several leaves, name one as the tip: {}", join(leaves_)));
+           fmt::format("several leaves, name one as the tip (--tip, or /robot/tip of a scene): {}",
+                       join(leaves_)));
     const auto at = links_.find(tip.value_or(leaves_.front()));
     if (at == links_.end()) {
       std::vector<std::string> names;

@@ -485,7 +485,7 @@ TEST_CASE("a bad URDF is refused in one line that names place and fault", "[desc
       {"nothing moves", R"(<robot name="r"><link name="a"/></robot>)",
        "no joint moves between 'a' and the tip 'a'"},
       {"several leaves", replaced(arm, "<parent link=\"lower\"/>", "<parent link=\"upper\"/>"),
-       "several leaves, name one as the tip: tool, lower"},
+       "several leaves, name one as the tip (--tip, or /robot/tip of a scene): tool, lower"},
   };
   REQUIRE(list.size() >= 40);
   for (const Bad& bad : list) {

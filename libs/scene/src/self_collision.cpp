@@ -166,7 +166,9 @@ std::string self_contact_remedy(const RobotRef& robot) {
   std::filesystem::path target = robot.spheres.value_or(robot.file);
   target.replace_extension(robot.spheres ? ".checked.json" : ".checked.srdf");
   return fmt::format(
-      "if they always touch, `{} --write {}` disables the pair; then name that file as /robot/{}",
+      "start elsewhere; or, if they always touch, `{} --write {}` disables the pair; then name "
+      "that "
+      "file as /robot/{}",
       command, target.string(), robot.spheres ? "spheres" : "srdf");
 }
 

@@ -94,6 +94,8 @@ class ClosedLoop {
   [[nodiscard]] bool arrived() const;
   /// Of the arm itself, at the current goal or the last one.
   [[nodiscard]] control::GoalError goal_error() const;
+  /// Why an arm within the tolerances of its goal has not reached it; empty if it is away from it.
+  [[nodiscard]] std::string why_not_there() const;
   /// Lets the controller look at the arm, as it measures it, and at its goals.
   void let_controller_observe();
   /// Passes on the targets that are due.

@@ -52,10 +52,28 @@ void ClosedLoop::check_outcome() {
     finish(log::Outcome::interrupted, "stopped from outside");
 }
 
+std::string ClosedLoop::why_not_there() const {
+  const control::GoalError error = goal_error();
+  if (error.reached || error.size > 1.0) return "";
+  const scene::Goal& goal = scene::options_of(controller_->goals().goal())[error.option];
+  const double fastest = plant_->node().v.lpNorm<Eigen::Infinity>();
+  if (!(fastest < goal.speed_max))
+    return fmt::format(
+        "; it is within the tolerances, but its fastest joint moves at {:.3g} rad/s or m/s, "
+        "expected "
+        "less than {:g} (speed_max)",
+        fastest, goal.speed_max);
+  return goal.tip_speed_max_m_s
+             ? fmt::format(
+                   "; it is within the tolerances, but its tip moves, expected less than {:g} m/s",
+                   *goal.tip_speed_max_m_s)
+             : "";
+}
+
 std::string ClosedLoop::timeout_cause() const {
   const std::string_view no_path = controller_->guide_cause();
-  std::string cause = fmt::format("goal not reached within {} s{}{}", scene_.duration_s,
-                                  no_path.empty() ? "" : ", no path: ", no_path);
+  std::string cause = fmt::format("goal not reached within {} s{}{}{}", scene_.duration_s,
+                                  no_path.empty() ? "" : ", no path: ", no_path, why_not_there());
   const auto shield = controller_->shield_report();
   if (!shield || !shield->stopping || !shield->at_rest) return cause;
   control::LineBuffer line;

@@ -151,10 +151,15 @@ TEST_CASE("robot check finds overlaps at rest, and the list that it writes resol
   }));
   for (const char* file : {"list.srdf", "list.json"}) {
     CAPTURE(file);
-    CHECK(sandbox
-              .run({"robot", "check", "arm.urdf", "--spheres", "s.json", "--srdf", "one.srdf",
-                    "--samples", "500", "--write", file})
-              .exit_code == 1);
+    const auto written = sandbox.run({"robot", "check", "arm.urdf", "--spheres", "s.json", "--srdf",
+                                      "one.srdf", "--samples", "500", "--write", file});
+    CHECK(written.exit_code == 1);
+    // Each pair that is not checked any more is named, with how often it is in contact.
+    CHECK_THAT(written.out, Catch::Contains("wrote " + std::string(file)));
+    for (const Json& overlap : strict["overlaps_at_rest"])
+      CHECK_THAT(written.out,
+                 Catch::Contains("added: " + overlap["parts"][0].get<std::string>() + " - " +
+                                 overlap["parts"][1].get<std::string>() + ": "));
   }
   const Json by_srdf = test::run_json(
       sandbox, {"robot", "check", "arm.urdf", "--spheres", "s.json", "--srdf", "list.srdf"});

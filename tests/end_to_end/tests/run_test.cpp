@@ -209,6 +209,20 @@ TEST_CASE(
   CHECK(test::run_json(sandbox, {"plugins", "list"}).is_structured());
 }
 
+TEST_CASE("an arm that is at its goal but does not rest times out, and the cause says so",
+          "[end_to_end]") {
+  Sandbox sandbox;
+  const Json result = test::run_json(
+      sandbox,
+      {"run", "data/scenes/pillar.json", "--set", "/obstacles=[]", "--planner", "template", "--set",
+       "/planner/params/damping=5", "--set", "/goals/0/speed_max=1e-9", "--duration", "6"},
+      1);
+  CHECK(result["outcome"] == "timeout");
+  CHECK_THAT(result["cause"].get<std::string>(),
+             Catch::Contains("within the tolerances, but its fastest joint moves at") &&
+                 Catch::Contains("expected less than 1e-09 (speed_max)"));
+}
+
 TEST_CASE("the scene that --print-config prints runs to the same result", "[end_to_end]") {
   Sandbox sandbox;
   for (const char* command : {"run", "integrate"}) {

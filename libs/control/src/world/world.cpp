@@ -222,7 +222,7 @@ std::uint64_t World::set_obstacle(scene::Obstacle obstacle) {
   if (model_.shapes().empty())
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: /robot: '{}' has no collision spheres or capsules, expected some "
-                            "because there are obstacles",
+                            "because there are obstacles; hamelin robot fit makes them",
                             scene_.name, model_.robot().name));
   auto obstacles = latest_->environment.obstacles();
   auto ids = latest_->obstacle_ids;

@@ -77,7 +77,9 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, doubl
     scratch_ = &own_->scratch;
     contacts_max = environment_->contacts_max(model.shapes().size());
   }
-  if (has_obstacles()) require_shapes(scene, model, "/robot", "some because there are obstacles");
+  if (has_obstacles())
+    require_shapes(scene, model, "/robot",
+                   "some because there are obstacles; hamelin robot fit makes them");
   if (scene.model.self_collision) {
     require_shapes(scene, model, "/model/self_collision", "some or false");
     self_ = std::make_unique<scene::SelfField>(model);
