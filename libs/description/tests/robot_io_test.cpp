@@ -820,9 +820,9 @@ std::string leaves_of(const fs::path& file) {
 
 TEST_CASE("the Panda loads with its tip, and without one its leaves are named",
           "[description][robot]") {
-  CHECK_THAT(leaves_of(test::third_party_robots / "panda.urdf"),
-             Catch::Contains(
-                 "name one as the tip: panda_leftfinger, panda_rightfinger, panda_grasptarget"));
+  CHECK_THAT(
+      leaves_of(test::third_party_robots / "panda.urdf"),
+      Catch::Contains("of a scene): panda_leftfinger, panda_rightfinger, panda_grasptarget"));
   RobotOptions options;
   options.tip = "panda_grasptarget";
   options.spheres = test::third_party_robots / "panda_spheres.json";
