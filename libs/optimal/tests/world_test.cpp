@@ -7,6 +7,7 @@
 #include "hamelin/optimal/world_clearance.hpp"
 #include "hamelin/test/errors.hpp"
 #include "hamelin/test/robots.hpp"
+#include "hamelin/test/skip.hpp"
 
 using namespace hamelin;
 using namespace hamelin::optimal;
@@ -264,27 +265,25 @@ TEST_CASE("a margin that is not proved makes the motion invalid, in one line", "
   CHECK(prove(goal.found.motion, view, {0.005, 10.0}).certified);
 }
 
-TEST_CASE("torques between the knots keep their limits, whatever the number of knots",
-          "[optimal][world]") {
+namespace {
+
+// The shortest motion between two configurations in which only torques are limited.
+void check_torques_between_knots(const std::vector<double>& from, const std::vector<double>& to,
+                                 int intervals) {
   Json document = pillar_scene();
   document.erase("obstacles");
   document["model"] = {{"joint_limits", false}, {"velocity_limits", false}};
-  const auto joints = GENERATE(
-      std::pair<std::vector<double>, std::vector<double>>{{0.3, -0.5, 0.4, -1.2, 0.2, 0.9, -0.3},
-                                                          {-0.9, 0.6, -0.4, 0.3, 1.5, -0.6, 2.0}},
-      std::pair<std::vector<double>, std::vector<double>>{{-1.0, 0.7, -0.2, 0.9, 0.0, -0.8, 0.5},
-                                                          {1.1, -0.4, 0.8, -1.5, -2.0, 0.4, 0.0}});
-  document["start"]["q"] = joints.first;
-  document["goals"][0]["q"] = joints.second;
+  document["start"]["q"] = from;
+  document["goals"][0]["q"] = to;
   const scene::Scene scene = scene_of(document);
   SceneMotionOptions options;
   options.objective = Objective::time;
-  options.intervals = GENERATE(6, 12);
+  options.intervals = intervals;
   options.duration_s = 1.0;
   options.limit_share = 1.0;
   const SceneMotion motion = optimize_scene(scene, options);
   const Optimized& found = motion.goals.at(0).found;
-  CAPTURE(options.intervals, found.torque_share, found.solution.violated);
+  CAPTURE(intervals, found.torque_share, found.solution.violated);
   CHECK(motion.valid());
   CHECK(found.torque_share <= 1.0);
   const VectorXd limit = Limits::of(motion.model).torque;
@@ -297,4 +296,21 @@ TEST_CASE("torques between the knots keep their limits, whatever the number of k
   }
   CHECK(most <= 1.0 + 1e-4);
   CHECK(most >= 0.9);  // some limit binds
+}
+
+}  // namespace
+
+TEST_CASE("torques between the knots keep their limits, whatever the number of knots",
+          "[optimal][world]") {
+  check_torques_between_knots({0.3, -0.5, 0.4, -1.2, 0.2, 0.9, -0.3},
+                              {-0.9, 0.6, -0.4, 0.3, 1.5, -0.6, 2.0}, GENERATE(6, 12));
+}
+
+TEST_CASE("torques between the knots keep their limits in a motion of many iterations",
+          "[optimal][world]") {
+#ifdef HAMELIN_SANITIZED
+  test::skip("1800 iterations take ten minutes under sanitizers");
+#endif
+  check_torques_between_knots({-1.0, 0.7, -0.2, 0.9, 0.0, -0.8, 0.5},
+                              {1.1, -0.4, 0.8, -1.5, -2.0, 0.4, 0.0}, GENERATE(6, 12));
 }

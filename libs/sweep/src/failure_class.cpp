@@ -22,7 +22,8 @@ bool is_word(char c) {
 /// Remarks that follow a cause and do not make it another one.
 std::string_view without_remarks(std::string_view cause) {
   for (const std::string_view remark :
-       {"; the exit direction is ", "; start elsewhere; or, if they always touch, "})
+       {"; the exit direction is ", "; start elsewhere; or, if they always touch, ",
+        "; if they always touch, ", "; it is within the tolerances, but "})
     cause = cause.substr(0, cause.find(remark));
   return cause;
 }
