@@ -116,7 +116,8 @@ TEST_CASE("planners are compared with themselves without a part", "[end_to_end]"
   }
   // the directory stores what was ablated, and only those runs have the part switched off
   CHECK(sandbox.run({"bench", "table", "parts"}).out == output.out);
-  for (const auto& run : sandbox.json("parts/plan.json")["runs"]) {
+  const Json plan = sandbox.json("parts/plan.json");
+  for (const auto& run : plan["runs"]) {
     const bool ablated = run["labels"]["planner"].get<std::string>().ends_with("=0");
     const bool set =
         run["set"].dump().find("/planner/params/repulsion_speed_m_s=0") != std::string::npos;
