@@ -88,7 +88,8 @@ no_package_task "cover without gcovr" './dev setup --all' cover
 
 configures_for_demo() {
   called "cmake --preset demo -DHAMELIN_COMMANDS=run;.* -DHAMELIN_BUILD_C_INTERFACE=OFF" &&
-    called 'cmake --build build/demo --target demo'
+    called 'cmake --build build/demo --target demo' &&
+    grep -A 3 '"name": "demo", "displayName"' "$source/CMakePresets.json" | grep -q '"HAMELIN_INSTRUCTION_SETS": "best"'
 }
 run demo
 expect "the demo builds what it runs, for this machine" configures_for_demo

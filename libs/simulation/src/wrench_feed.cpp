@@ -31,8 +31,8 @@ WrenchFeed::WrenchFeed(const std::vector<scene::WrenchSpec>& given, const model:
 bool WrenchFeed::advance(double time_s) {
   bool changed = false;
   for (Timed& each : all_) {
-    const double until_s = time_s + time_rounding_s;
-    const bool acts = each.from_s <= until_s && until_s < each.to_s;
+    const double now_s = time_s + time_rounding_s;
+    const bool acts = each.from_s <= now_s && now_s < each.to_s;
     changed = changed || acts != each.acts;
     each.acts = acts;
   }

@@ -24,9 +24,8 @@ TEST_CASE("causes of planners and runs that differ in names, numbers and signs h
         "touch, `hamelin robot check a.urdf --write b.srdf` disables the pair; then name that file "
         "as /robot/srdf",
         "the arm touches itself: 'l7' and 'l2' are 12 mm inside each other at 0 s; start "
-        "elsewhere; "
-        "or, if they always touch, `hamelin robot check a.urdf --write b.srdf` disables the pair; "
-        "then name that file as /robot/srdf"},
+        "elsewhere; or, if they always touch, `hamelin robot check a.urdf --write b.srdf` disables "
+        "the pair; then name that file as /robot/srdf"},
        "the arm touches itself: '*' and '*' are N mm inside each other at N s"},
       {{"force balance: the obstacle next to link 'hand' balances the attraction to the goal",
         "force balance: the obstacle next to link 'l1' balances the attraction to the goal"},
