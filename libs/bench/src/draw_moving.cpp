@@ -96,6 +96,7 @@ class MovingDrawer {
   [[nodiscard]] std::vector<Vector3d> points(const VectorXd& q) {
     dynamics::forward_kinematics(model_, ws_, q);
     std::vector<Vector3d> out;
+    out.reserve(static_cast<std::size_t>(model_.dof()) + 1);
     for (int i = 0; i < model_.dof(); ++i) out.push_back(dynamics::link_pose(model_, ws_, i).p());
     out.push_back(dynamics::tip_pose(model_, ws_).p());
     return out;

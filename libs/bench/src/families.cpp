@@ -288,6 +288,7 @@ const Family& family_of(std::string_view name) {
 const std::vector<std::string>& families() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> list;
+    list.reserve(std::size(all));
     for (const auto& family : all) list.emplace_back(family.name);
     return list;
   }();

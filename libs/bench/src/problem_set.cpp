@@ -76,7 +76,7 @@ std::string path_from_directory(const fs::path& file, const fs::path& directory)
 
 // Reads the path of a file and checks that its content is the one that the set was drawn for.
 fs::path checked_file(const Json& robot, const char* key, const fs::path& set) {
-  const fs::path file = resolve_path(set.parent_path(), robot.at(key).get<std::string>());
+  fs::path file = resolve_path(set.parent_path(), robot.at(key).get<std::string>());
   const std::string expected = robot.at(fmt::format("{}_sha256", key)).get<std::string>();
   if (const std::string found = sha256_of_file(file); found != expected)
     throw Error(ErrorCode::invalid,

@@ -103,6 +103,7 @@ void compute(const Model& model, DerivativesWorkspace& ws, PotentialDerivatives&
 
 std::vector<kernel::DerivativeLink> derivative_links(const Model& model) {
   std::vector<kernel::DerivativeLink> links;
+  links.reserve(static_cast<std::size_t>(model.dof()));
   for (int i = 0; i < model.dof(); ++i)
     links.push_back(
         link_of(model.robot().links[static_cast<std::size_t>(i)], model.com_in_frame(i)));

@@ -139,7 +139,8 @@ void point_jacobian_transpose(const Model& model, const Workspace& ws, int link,
                               VectorRef row) {
   check_posed_link("point_jacobian_transpose", model, ws, link);
   detail::Call("point_jacobian_transpose", model, ws.owner).joints("row", row);
-  const Vector3d point = point_world, direction = direction_world;  // row may be one of them
+  // row may be one of them. NOLINTNEXTLINE(performance-unnecessary-copy-initialization)
+  const Vector3d point = point_world, direction = direction_world;
   row.setZero();
   for (int j = link; j >= 0; j = parent(model, j))
     row[j] = direction.dot(velocity_column(model, ws, j, point));

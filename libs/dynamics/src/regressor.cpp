@@ -178,7 +178,7 @@ model::Robot with_inertial_parameters(const Model& model, const VectorXd& parame
     model::Link& link = robot.links[static_cast<std::size_t>(i)];
     const auto part =
         parameters.segment<inertial_parameters_per_link>(inertial_parameters_per_link * i);
-    const SE3 before = model.com_in_frame(i);
+    const SE3& before = model.com_in_frame(i);
     const double mass = part[0];
     const Vector3d center = mass > 0.0 ? Vector3d(part.segment<3>(1) / mass) : before.p();
     Matrix3d inertia;

@@ -73,7 +73,7 @@ VectorXd minimum(const Objective& objective, VectorXd x) {
       moved = objective.evaluate(trial, nullptr, nullptr) <= value - sufficient * expected;
     }
     if (!moved) return x;  // rounding is larger than any decrease
-    x = std::move(trial);
+    x.swap(trial);
   }
   return x;
 }

@@ -83,8 +83,8 @@ Divergence divergence(const LinkParameters& z) {
     out.value = infinity;
     return out;
   }
-  const Matrix4d factor_L = factor.matrixL();
-  out.value = shifted.trace() - 4.0 - 2.0 * factor_L.diagonal().array().log().sum();
+  const Matrix4d lower = factor.matrixL();
+  out.value = shifted.trace() - 4.0 - 2.0 * lower.diagonal().array().log().sum();
   const Matrix4d inverse = factor.solve(Matrix4d::Identity());
   std::array<Matrix4d, 10> turned;
   for (int i = 0; i < 10; ++i) {

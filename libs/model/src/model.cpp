@@ -268,6 +268,7 @@ int index_of(const char* what, std::string_view name, const std::string& robot, 
   for (std::size_t i = 0; i < list.size(); ++i)
     if (name_of(list[i]) == name) return static_cast<int>(i);
   std::vector<std::string> names;
+  names.reserve(list.size());
   for (const auto& each : list) names.push_back(name_of(each));
   const std::string similar = did_you_mean(name, names);
   const std::size_t more = names.size() - std::min(names.size(), listed_max);

@@ -184,7 +184,7 @@ std::string Search::Run::no_root() const {
   return fmt::format("no clear configuration was found at any of {} goals", problem_.goals.size());
 }
 
-bool Search::Run::add_root(Root root) {
+bool Search::Run::add_root(const Root& root) {
   roots_.push_back(root);
   set_margins();
   if (!approach(roots_.back())) {

@@ -54,7 +54,7 @@ class Search::Run {
   /// Begins with the stretch that leads away from the start. @return whether it is clear
   [[nodiscard]] bool retreat();
   /// @return whether its approach is clear
-  [[nodiscard]] bool add_root(Root root);
+  [[nodiscard]] bool add_root(const Root& root);
   [[nodiscard]] bool approach(Root& root);
   /// @return the node of its last point
   static int add_chain(const Eigen::MatrixXd& points, Tree& tree);

@@ -126,7 +126,7 @@ MoverTracker::Update MoverTracker::update(double time_s, const geometry::SE3& se
   Update out;
   out.taken.assign(static_cast<std::size_t>(points.cols()), 0);
   std::vector<std::uint8_t> assigned(tracks_.size(), 0);
-  const Eigen::Matrix3d axes = sensor.R();
+  const Eigen::Matrix3d& axes = sensor.R();
   for (const Cluster& cluster : clusters_of(axes, points, loose)) {
     const Vector3d center = axes * (0.5 * (cluster.low + cluster.high)),
                    size = cluster.high - cluster.low;

@@ -41,7 +41,7 @@ void check_label(const std::vector<MergedRun>& runs, const std::string& option,
 /// All labels but the ignored ones, after `first`.
 Key key_of(const MergedRun& r, const std::set<std::string>& ignore, Key first) {
   for (const auto& [name, value] : r.run.labels)
-    if (!ignore.contains(name)) first.push_back(name + "=" + value);
+    if (!ignore.contains(name)) first.push_back(fmt::format("{}={}", name, value));
   return first;
 }
 

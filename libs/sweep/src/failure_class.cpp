@@ -115,7 +115,7 @@ void join_parts_of_links(std::string& text) {
 /// The parts of a crash that name it: "signal 11 (Segmentation fault)", "exit code 3".
 std::string crash_class(const std::string& cause) {
   const auto end = cause.find(": ");
-  const std::string head = cause.substr(0, end);
+  std::string head = cause.substr(0, end);
   if (end == std::string::npos || !head.starts_with("exit code")) return head;
   return fmt::format("{}: {}", head, normalised_cause(cause.substr(end + 2)));
 }

@@ -194,6 +194,7 @@ class Planner {
       std::iota(left.begin(), left.end(), std::size_t{0});
       while (!left.empty()) {
         std::vector<SE3> poses;
+        poses.reserve(left.size());
         for (const std::size_t k : left) poses.push_back(pose * object.grasps[k]);
         const auto landing = land(done, poses, approach, {{}, {object.solid.name}});
         if (!landing) break;

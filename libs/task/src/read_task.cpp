@@ -86,6 +86,7 @@ Pick read_pick(const Json& given, const std::vector<Object>& objects, const std:
   Pick out;
   const auto name = given["object"].get<std::string>();
   std::vector<std::string> names;
+  names.reserve(objects.size());
   for (const Object& object : objects) names.push_back(object.solid.name);
   while (out.object < names.size() && names[out.object] != name) ++out.object;
   if (out.object == names.size())

@@ -149,6 +149,7 @@ std::uint64_t Controller::detach(std::string_view name, const VectorXd& q) {
                                   [&](const auto& payload) { return payload.name == name; });
   if (found == all.end()) {
     std::vector<std::string> names;
+    names.reserve(all.size());
     for (const auto& payload : all) names.push_back(payload.name);
     throw Error(ErrorCode::invalid,
                 fmt::format("payload '{}': is not attached, expected one of the {} that are{}",

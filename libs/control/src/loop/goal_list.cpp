@@ -209,6 +209,7 @@ std::string joints_defect(const scene::JointTrajectory& trajectory, const model:
 
 std::vector<scene::Allowance> allowances_of(const std::vector<scene::Goal>& goals) {
   std::vector<scene::Allowance> out;
+  out.reserve(goals.size());
   for (const auto& goal : goals) out.push_back(goal.may_touch);
   return out;
 }

@@ -37,8 +37,10 @@ struct Ints {
 };
 
 // Applies an operation to each register.
+// NOLINTBEGIN(bugprone-macro-parentheses): names of variables
 #define HAMELIN_EACH(out, expression) \
   _Pragma("GCC unroll 4") for (int i = 0; i < registers; ++i) out.v[i] = expression
+// NOLINTEND(bugprone-macro-parentheses)
 
 HAMELIN_INLINE Reals splat(float x) {
   Reals out;

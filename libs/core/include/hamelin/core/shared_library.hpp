@@ -28,8 +28,9 @@ class SharedLibrary {
 
 /// Declares a member that points to a function of C of the same name, for tables such as
 /// `struct Api { SharedLibrary library{…}; HAMELIN_LOADED(library, mj_step); };`
-// NOLINTNEXTLINE(bugprone-macro-parentheses): a declaration
+// NOLINTBEGIN(bugprone-macro-parentheses): a declaration
 #define HAMELIN_LOADED(library, name) \
   decltype(::name)* name = (library).find<decltype(::name)>(#name)
+// NOLINTEND(bugprone-macro-parentheses)
 
 }  // namespace hamelin
