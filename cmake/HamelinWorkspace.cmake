@@ -52,6 +52,9 @@ if(HAMELIN_SANITIZE)
   target_compile_definitions(hamelin_options INTERFACE HAMELIN_SANITIZED)
 endif()
 
+# Compiler options of code that is not performance-critical. GCC takes a fifth less time than with -O1 or -O0.
+set(HAMELIN_COLD_OPTIONS $<$<CONFIG:Release>:$<IF:$<CXX_COMPILER_ID:GNU>,-Og,-O1>>)
+
 # hamelin_library(NAME model [DEPS geometry ...] [SOURCES src/a.cpp ...] [LINKS Eigen3::Eigen]
 #                 [PRIVATE_LINKS ...] [PACKAGES Eigen3 ...] [TEST_LINKS hamelin::io ...] [COLD] [INTERNAL])
 #
@@ -74,7 +77,7 @@ function(hamelin_library)
     add_library(${target} STATIC ${arg_SOURCES})
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:hamelin_options> ${arg_PRIVATE_LINKS})
     if(arg_COLD)
-      target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+      target_compile_options(${target} PRIVATE ${HAMELIN_COLD_OPTIONS})
     endif()
   else()
     set(scope INTERFACE)
@@ -201,9 +204,9 @@ function(hamelin_tests)
   endif()
   set(target hamelin_${arg_NAME}_tests)
   add_executable(${target} ${tests})
-  # Compiling tests takes longer than running them. At -O1 GCC warns wrongly of uninitialised values
+  # Compiling tests takes longer than running them. Then GCC warns wrongly of uninitialised values
   # in std::optional.
-  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>
+  target_compile_options(${target} PRIVATE ${HAMELIN_COLD_OPTIONS}
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   if(NOT TARGET hamelin_test_support)
     add_library(hamelin_test_support OBJECT "${PROJECT_SOURCE_DIR}/tests/support/skip.cpp")
