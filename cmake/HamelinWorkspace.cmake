@@ -15,7 +15,7 @@ set(HAMELIN_BUILD_PLUGIN_DIR "${PROJECT_BINARY_DIR}/lib/hamelin/plugins")
 # little and a missing include is found.
 option(HAMELIN_UNITY "Compile several sources of a target as one, in a third of the time" ON)
 set(CMAKE_UNITY_BUILD ${HAMELIN_UNITY})
-set(CMAKE_UNITY_BUILD_BATCH_SIZE 20)
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 30)
 
 # Linked as $<BUILD_INTERFACE:...> only, so that users of the package do not inherit its flags.
 add_library(hamelin_options INTERFACE)

@@ -17,7 +17,7 @@ namespace {
 // The largest path of any point of the arm on a piece of a motion, as a share of the influence:
 // longer pieces would be bisected for each shape apart.
 constexpr double piece_share = 0.5, piece_min_m = 0.01;
-constexpr double pieces_max = 4096.0;
+constexpr double motion_pieces_max = 4096.0;
 
 }  // namespace
 
@@ -134,7 +134,7 @@ bool WorldQuery::motion_clear(const double* q0, const double* q1, double now_s, 
   if (!measure(to_) || !measure(from_)) return false;  // most motions that fail end in contact
   const double piece_m = std::max(piece_min_m, piece_share * influence_);
   const double pieces =
-      std::clamp(std::ceil(certificate_.longest_path(dq_) / piece_m), 1.0, pieces_max);
+      std::clamp(std::ceil(certificate_.longest_path(dq_) / piece_m), 1.0, motion_pieces_max);
   margin_m = influence_;
   for (double i = 1.0; i <= pieces; ++i) {
     const double left = 1.0 - i / pieces;
