@@ -34,7 +34,7 @@ struct SetOptions {
   bool json = false;
 };
 
-struct RunOptions : SetOptions {
+struct BenchRunOptions : SetOptions {
   std::vector<std::string> planners, assignments, ablations;
   bool expect_gain = false;
   std::optional<std::string> goal;
@@ -94,7 +94,7 @@ int bench_make(const SetOptions& options) {
 }
 
 // The problems of a set with maps, each with a goal of the chosen kind.
-void add_problems(sweep::PlanOptions& plan, const RunOptions& options, const fs::path& file,
+void add_problems(sweep::PlanOptions& plan, const BenchRunOptions& options, const fs::path& file,
                   const bench::ProblemSet& set, const std::vector<bench::Problem>& problems) {
   constexpr double longest_s = 20.0;
   if (!options.predictions.empty())
@@ -109,8 +109,9 @@ void add_problems(sweep::PlanOptions& plan, const RunOptions& options, const fs:
 }
 
 // The scenes of a set whose obstacles move, once per prediction.
-void add_moving_scenes(sweep::PlanOptions& plan, const RunOptions& options, const fs::path& file,
-                       const bench::ProblemSet& set, const std::vector<bench::Problem>& problems) {
+void add_moving_scenes(sweep::PlanOptions& plan, const BenchRunOptions& options,
+                       const fs::path& file, const bench::ProblemSet& set,
+                       const std::vector<bench::Problem>& problems) {
   if (options.goal)
     throw Error(ErrorCode::usage,
                 "--goal: has no effect, as problems with moving obstacles have joint goals");
@@ -128,8 +129,8 @@ void add_moving_scenes(sweep::PlanOptions& plan, const RunOptions& options, cons
   plan.duration_s = options.duration_s;
 }
 
-void plan_benchmark(const RunOptions& options, const fs::path& file, const bench::ProblemSet& set,
-                    const std::vector<bench::Problem>& problems) {
+void plan_benchmark(const BenchRunOptions& options, const fs::path& file,
+                    const bench::ProblemSet& set, const std::vector<bench::Problem>& problems) {
   sweep::PlanOptions plan;
   plan.planners = options.planners;
   plan.set = options.assignments;
@@ -146,7 +147,7 @@ void plan_benchmark(const RunOptions& options, const fs::path& file, const bench
   if (!is_moving(set)) bench::check_maps(problems, made, file.string());
 }
 
-sweep::RunOutcome run_benchmark(const RunOptions& options) {
+sweep::RunOutcome run_benchmark(const BenchRunOptions& options) {
   sweep::RunOptions sweep;
   run_in_forks(sweep, options.plugin_path);
   sweep.jobs = options.jobs;
@@ -181,7 +182,7 @@ int bench_table(const TableOptions& options) {
   return 0;
 }
 
-int bench_run(const RunOptions& options) {
+int bench_run(const BenchRunOptions& options) {
   if (options.expect_gain && options.ablations.empty())
     throw Error(ErrorCode::usage, "--expect-gain: has no effect without --ablate");
   const fs::path file = set_file(options.set);
@@ -309,7 +310,7 @@ void add_make(CLI::App& parent, int& exit_code) {
   command->callback([options, &exit_code] { exit_code = bench_make(*options); });
 }
 
-void add_planner_options(CLI::App& command, RunOptions& options) {
+void add_planner_options(CLI::App& command, BenchRunOptions& options) {
   command
       .add_option("--planner", options.planners,
                   "planner, with parameters as in hybrid:escape=none, with a guide as in "
@@ -328,7 +329,7 @@ void add_planner_options(CLI::App& command, RunOptions& options) {
                    "problems without a part (p < 0.05), and name the part");
 }
 
-void add_moving_options(CLI::App& command, RunOptions& options) {
+void add_moving_options(CLI::App& command, BenchRunOptions& options) {
   restrict_values(
       command.add_option("--prediction", options.predictions,
                          "where obstacles move: what planners are told of their motion; may be "
@@ -350,7 +351,7 @@ void add_run_command(CLI::App& parent, int& exit_code) {
       "hamelin bench run --planner hybrid+rrt-connect --planner python:mine.py:Mine -o full\n"
       "hamelin bench run --ablate steering --ablate escape=none --per-family 2 -o parts\n"
       "hamelin bench run --problems moving --per-cell 1 --explain -o moving");
-  const auto options = std::make_shared<RunOptions>();
+  const auto options = std::make_shared<BenchRunOptions>();
   command->add_option("-o,--output", options->output, "directory to write problems and records to")
       ->required()
       ->type_name("DIR");
