@@ -52,8 +52,8 @@ if(HAMELIN_SANITIZE)
   target_compile_definitions(hamelin_options INTERFACE HAMELIN_SANITIZED)
 endif()
 
-# Compiler options of code that is not performance-critical. With -Og GCC would take a fifth less time, and runs with
-# logs an eighth more: of an inline function that several sources compile, the linker keeps any copy.
+# Compiler options of code that is not performance-critical. With -Og GCC would take a fifth less time, but runs with
+# logs would take an eighth more: the linker keeps one copy of each inline function, also for sources with -O3.
 set(HAMELIN_COLD_OPTIONS $<$<CONFIG:Release>:-O1>)
 
 # hamelin_library(NAME model [DEPS geometry ...] [SOURCES src/a.cpp ...] [LINKS Eigen3::Eigen]
@@ -205,7 +205,7 @@ function(hamelin_tests)
   endif()
   set(target hamelin_${arg_NAME}_tests)
   add_executable(${target} ${tests})
-  # Compiling tests takes longer than running them, and least with -Og. Then GCC warns wrongly of
+  # Compiling tests takes longer than running them, and least with -Og. There GCC warns wrongly of
   # uninitialised values in std::optional.
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:$<IF:$<CXX_COMPILER_ID:GNU>,-Og,-O1>>
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)

@@ -82,7 +82,8 @@ TEST_CASE("the next client sees an arm that stops until it requests to resume", 
   unsigned ticks = 0;
   {
     Client client(serving.socket());
-    while (std::abs(arm.speed()) <= 1e-3 && ++ticks < 10000) {  // the motion is sought meanwhile
+    // A motion is sought meanwhile.
+    for (; ticks < 100 || (std::abs(arm.speed()) <= 1e-3 && ticks < 10000); ++ticks) {
       (void)exchange(client, arm);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }

@@ -24,8 +24,9 @@ TEST_CASE("explain says whether a contact was avoidable, as text and as JSON", "
   log_contact(sandbox, "run.jsonl.zst");
   const auto text = sandbox.run({"explain", "run.jsonl.zst"});
   CHECK(text.exit_code == 0);
-  for (const std::string& line : lines_of(text.err))  // of a search that takes longer
-    CHECK_THAT(line, Catch::EndsWith("starts searched"));
+#ifndef HAMELIN_SANITIZED  // a search that takes longer shows its progress
+  CHECK(text.err == "");
+#endif
   CHECK_THAT(text.out, Catch::StartsWith("verdict     avoidable_in_hindsight"));
   CHECK_THAT(text.out, Catch::Contains("known       never") &&
                            Catch::Contains("the obstacle was not known then"));
