@@ -56,25 +56,31 @@ endif()
 # logs would take an eighth more: the linker keeps one copy of each inline function, also for sources with -O3.
 set(HAMELIN_COLD_OPTIONS $<$<CONFIG:Release>:-O1>)
 
-# hamelin_library(NAME model [DEPS geometry ...] [SOURCES src/a.cpp ...] [LINKS Eigen3::Eigen]
+option(HAMELIN_FURTHER_SOURCES "Compile also what `hamelin run` does not need" ON)
+
+# hamelin_library(NAME model [DEPS geometry ...] [SOURCES src/a.cpp ...] [FURTHER src/b.cpp ...] [LINKS Eigen3::Eigen]
 #                 [PRIVATE_LINKS ...] [PACKAGES Eigen3 ...] [TEST_LINKS hamelin::io ...] [COLD] [INTERNAL])
 #
 # Defines hamelin::NAME in the calling folder: headers in include/hamelin/NAME, tests/*_test.cpp as
 # one test program, bench/*_bench.cpp as one benchmark program. A DEP must precede NAME in
 # libs/CMakeLists.txt, so the order there is the dependency order and cycles are impossible.
+# FURTHER are sources that a build without HAMELIN_FURTHER_SOURCES leaves out.
 # PACKAGES are the packages that find_package(hamelin COMPONENTS NAME) must find for the libraries
 # in LINKS and PRIVATE_LINKS. TEST_LINKS are libraries that only the tests need; they may come later
 # than NAME. COLD marks a library that is not performance-critical and is compiled with less
 # optimisation. INTERNAL marks one that is not installed: programs of the workspace link it.
 function(hamelin_library)
   cmake_parse_arguments(PARSE_ARGV 0 arg "COLD;INTERNAL" "NAME"
-    "DEPS;SOURCES;LINKS;PRIVATE_LINKS;PACKAGES;TEST_LINKS;TEST_LABELS")
+    "DEPS;SOURCES;FURTHER;LINKS;PRIVATE_LINKS;PACKAGES;TEST_LINKS;TEST_LABELS")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "hamelin_library(${arg_NAME}): unknown argument ${arg_UNPARSED_ARGUMENTS}")
   endif()
   set(target hamelin_${arg_NAME})
   if(arg_SOURCES)
     set(scope PUBLIC)
+    if(HAMELIN_FURTHER_SOURCES)
+      list(APPEND arg_SOURCES ${arg_FURTHER})
+    endif()
     add_library(${target} STATIC ${arg_SOURCES})
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:hamelin_options> ${arg_PRIVATE_LINKS})
     if(arg_COLD)
@@ -170,13 +176,16 @@ foreach(name IN ITEMS baseline v3 v4)
   endif()
 endforeach()
 
-# hamelin_isa_sources(TARGET SOURCE... [LINKS ...]): compiles each source once for every instruction
+# hamelin_isa_sources(TARGET SOURCE... [FURTHER SOURCE...] [LINKS ...]): compiles each source once for every instruction
 # set of core/isa.hpp. docs/decisions/0006-instruction-sets.md says what such a source may use, and
 # a test checks the objects. Products may be contracted to FMA, because results are bit-identical on
 # one instruction set only.
 function(hamelin_isa_sources target)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "LINKS")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "FURTHER;LINKS")
   set(sources ${arg_UNPARSED_ARGUMENTS})
+  if(HAMELIN_FURTHER_SOURCES)
+    list(APPEND sources ${arg_FURTHER})
+  endif()
   set(flags_baseline "")
   set(flags_v3 -mavx2 -mfma)
   set(flags_v4 -mavx2 -mfma -mavx512f -mavx512vl -mavx512dq)

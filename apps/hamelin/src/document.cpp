@@ -64,7 +64,7 @@ bool holds_records(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::string line;
   std::getline(in, line);
-  const Json first = Json::parse(line, nullptr, false);
+  const Json first = try_parse_json(line);
   return first.is_object() && first.value("schema", Json()) == "hamelin.record/1";
 }
 
@@ -87,7 +87,7 @@ Kind recognise(const std::filesystem::path& file) {
                 fmt::format("{}: is not a map, XML or a JSON object", file.string()));
   // A log is the only format with one JSON object per line.
   const std::string line = text.substr(0, text.find('\n'));
-  if (const Json head = Json::parse(line, nullptr, false);
+  if (const Json head = try_parse_json(line);
       head.is_object() && head.value("type", Json()) == "header")
     return Kind::log;
   const Json document = parse_json(text, file.string());

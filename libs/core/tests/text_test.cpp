@@ -49,3 +49,11 @@ TEST_CASE("an error message ends with the nearest name, if there is one", "[core
   CHECK(did_you_mean("sede", {"seed", "step_s"}) == "; did you mean 'seed'?");
   CHECK(did_you_mean("gravity", {"seed", "step_s"}).empty());
 }
+
+TEST_CASE("the names of a list keep its order", "[core][unit]") {
+  struct Named {
+    std::string name;
+  };
+  CHECK(names_of(std::vector<Named>{{"b"}, {"a"}}) == std::vector<std::string>{"b", "a"});
+  CHECK(names_of(std::vector<Named>{}).empty());
+}

@@ -18,7 +18,13 @@ inline const model::Model::NamedFrame& named_frame(const char* function, const M
   return frames[static_cast<std::size_t>(frame)];
 }
 
-/// Its world pose; ws has the poses of the links.
+/// Frames of external wrenches.
+template <class Wrenches>
+void check_frames(const char* function, const Model& model, const Wrenches& wrenches) {
+  for (const auto& each : wrenches) (void)named_frame(function, model, each.frame);
+}
+
+/// The frame's world pose; ws has the poses of the links.
 inline geometry::SE3 pose_of(const Workspace& ws, const model::Model::NamedFrame& frame) {
   if (frame.link < 0) return frame.in_link;
   const Workspace::Frame& at = ws.frames[static_cast<std::size_t>(frame.link)];

@@ -109,6 +109,10 @@ Json parse_json(std::string_view text, const std::string& where) {
   return builder.take();
 }
 
+Json try_parse_json(std::string_view text) {
+  return Json::parse(text, nullptr, false);
+}
+
 Json read_json(const std::filesystem::path& file) {
   return parse_json(read_file(file), file.string());
 }

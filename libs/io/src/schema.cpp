@@ -214,6 +214,12 @@ std::string_view schema_text(std::string_view name) {
   return embedded_schema(fmt::format("{}.schema.json", name));
 }
 
+Json shipped_schema(std::string_view name) {
+  const auto text = schema_text(name);
+  if (text.empty()) throw Error(ErrorCode::usage, fmt::format("no schema '{}' is shipped", name));
+  return Json::parse(text);
+}
+
 void check_shipped_schema(const Json& document, std::string_view schema_name,
                           const std::string& where) {
   static std::mutex mutex;
@@ -221,12 +227,8 @@ void check_shipped_schema(const Json& document, std::string_view schema_name,
   const auto schema = [&] {
     const std::lock_guard lock(mutex);
     auto at = cache.find(schema_name);
-    if (at == cache.end()) {
-      const auto text = schema_text(schema_name);
-      if (text.empty())
-        throw Error(ErrorCode::usage, fmt::format("no schema '{}' is shipped", schema_name));
-      at = cache.emplace(schema_name, Schema(Json::parse(text), where)).first;
-    }
+    if (at == cache.end())
+      at = cache.emplace(schema_name, Schema(shipped_schema(schema_name), where)).first;
     return at->second;
   }();
   schema.check(document, where);

@@ -33,11 +33,11 @@ std::string place(const std::filesystem::path& file, std::size_t line) {
 // The schema of one kind of line, with the definitions that it refers to.
 Json line_schema(const std::string& type) {
   if (type == "result") {
-    Json schema = Json::parse(schema_text("result"));
+    Json schema = shipped_schema("result");
     schema["properties"]["type"] = {{"description", "kind of line"}, {"const", "result"}};
     return schema;
   }
-  const Json run = Json::parse(schema_text("run"));
+  const Json run = shipped_schema("run");
   Json schema = run["definitions"][type];
   schema["definitions"] = run["definitions"];
   return schema;

@@ -12,6 +12,7 @@
 #include "arguments.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/text.hpp"
 
 namespace hamelin::python {
 
@@ -211,9 +212,7 @@ py::tuple boxes(const BoundEnvironment& e) {
 }
 
 std::vector<std::string> obstacle_names(const BoundEnvironment& e) {
-  std::vector<std::string> names;
-  for (const auto& obstacle : e.environment.obstacles()) names.push_back(obstacle.name);
-  return names;
+  return names_of(e.environment.obstacles());
 }
 
 }  // namespace

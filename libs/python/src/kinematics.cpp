@@ -33,11 +33,9 @@ int index_of(const char* function, const char* argument, py::handle given, const
              const char* what) {
   if (PyUnicode_Check(given.ptr()) != 0) {
     const auto name = given.cast<std::string_view>();
-    std::vector<std::string> names;
-    names.reserve(list.size());
     for (std::size_t i = 0; i < list.size(); ++i)
       if (list[i].name == name) return static_cast<int>(i);
-    for (const auto& each : list) names.push_back(each.name);
+    const std::vector<std::string> names = names_of(list);
     refuse(function, argument,
            fmt::format("'{}' is not {}, expected one of {}{}", name, what, fmt::join(names, ", "),
                        did_you_mean(name, names)));

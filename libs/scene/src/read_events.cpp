@@ -14,14 +14,12 @@ namespace {
 // An obstacle that an arm carries must be one that rests by itself, and that it can see.
 void check_carried(const Reader& event, const Event& given, const Scene& scene) {
   if (!given.attach) event.fail("obstacle", "is given without attach, expected both");
-  std::vector<std::string> names;
-  for (const Obstacle& obstacle : scene.obstacles) {
-    names.push_back(obstacle.name);
+  const std::vector<std::string> names = names_of(scene.obstacles);
+  for (const Obstacle& obstacle : scene.obstacles)
     if (obstacle.attached_to == given.obstacle)
       event.fail("obstacle", fmt::format("obstacle '{}' is attached to '{}', expected an obstacle "
                                          "that nothing is attached to",
                                          obstacle.name, given.obstacle));
-  }
   const auto found = std::find(names.begin(), names.end(), given.obstacle);
   if (found == names.end())
     event.fail("obstacle",

@@ -44,8 +44,7 @@ GuideSpec read_guide(const Reader& planner) {
 // Cameras may find obstacles that no scene names.
 void check_named(const Reader& in, const Scene& scene) {
   if (!scene.sensors.empty()) return;
-  std::vector<std::string> names;
-  for (const Obstacle& obstacle : scene.obstacles) names.push_back(obstacle.name);
+  const std::vector<std::string> names = names_of(scene.obstacles);
   for (std::size_t i = 0; i < scene.goals.size(); ++i)
     for (const std::string& name : scene.goals[i].may_touch.obstacles)
       if (std::find(names.begin(), names.end(), name) == names.end())

@@ -38,7 +38,7 @@ Assignment read_assignment(std::string_view text) {
     assignment.fail("the part before '=' is not a JSON pointer");
   }
   const std::string value(text.substr(equals + 1));
-  assignment.value = Json::parse(value, nullptr, false);
+  assignment.value = try_parse_json(value);
   if (assignment.value.is_discarded()) assignment.value = value;
   return assignment;
 }
@@ -65,7 +65,7 @@ void check_known(const Json& properties, const std::string& key, const Assignmen
 
 void set_pointer(Json& document, std::string_view text) {
   Assignment assignment = read_assignment(text);
-  const Json schema = Json::parse(schema_text("scene"));
+  const Json schema = shipped_schema("scene");
   const Json* rule = &schema;  // of the value that `at` points to; null where the schema has none
   Json changed = document;
   Json* at = &changed;

@@ -262,7 +262,7 @@ std::optional<long> logged_stop_step(const fs::path& log) {
   log::LogReader reader(log);
   std::string last;
   for (std::string_view line; reader.next_text(line);) last = line;
-  const Json result = Json::parse(last, nullptr, false);
+  const Json result = try_parse_json(last);
   if (!result.is_object() || result.value("type", Json()) != "result" ||
       result.value("outcome", Json()) != "interrupted" || !result.contains("steps") ||
       !result["steps"].is_number_integer())

@@ -41,7 +41,7 @@ std::vector<log::Input> inputs_of(const scene::Scene& scene) {
 Json resolved_config(const scene::Scene& scene) {
   Json config = scene::resolved_json(scene);
   Json& params = config["integrator"]["params"];
-  params = with_defaults(params, Json::parse(schema_text("integrator")));
+  params = with_defaults(params, shipped_schema("integrator"));
   return config;
 }
 

@@ -107,7 +107,7 @@ class Join {
       if (sweeps_.machine.is_null()) sweeps_.machine = machine_of(record["result"]);
     }
     if (run.facts.recorded) {
-      const Json before = Json::parse(lines_.read(run.place));
+      const Json before = lines_.read_json(run.place);
       if (repeatable_text(before, run.run) == repeatable_text(record, run.run))
         ++sweeps_.repeated;
       else
@@ -164,8 +164,8 @@ void write_records(const Sweeps& sweeps, const fs::path& file, bool timing) {
   LineReader lines(sweeps);
   for (const auto& run : sweeps.runs) {
     if (!run.facts.recorded) continue;
-    const std::string line = lines.read(run.place);
-    out.append(timing ? line : repeatable_text(Json::parse(line), run.run));
+    out.append(timing ? lines.read(run.place)
+                      : repeatable_text(lines.read_json(run.place), run.run));
     out.append("\n");
   }
   out.commit();

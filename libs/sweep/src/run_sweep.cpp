@@ -222,7 +222,7 @@ class Sweep {
   void finish(const Child& child) {
     const int status = child.reap();
     if (stopping()) return;  // the child was terminated
-    Json output = Json::parse(child.out.text(), nullptr, false);
+    Json output = try_parse_json(child.out.text());
     const bool returned = WIFEXITED(status) && output.is_object() && output.contains("result") &&
                           output.contains("judge") && output["result"].is_object();
     const bool interrupted = returned

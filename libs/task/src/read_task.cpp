@@ -147,8 +147,7 @@ std::vector<Step> read_steps(const Json& list, const std::vector<Object>& object
 }
 
 void check_supports(const Task& task, const std::string& where) {
-  std::vector<std::string> names;
-  for (const scene::Obstacle& obstacle : task.scene.obstacles) names.push_back(obstacle.name);
+  const std::vector<std::string> names = names_of(task.scene.obstacles);
   const auto check = [&](const scene::Allowance& support, const std::string& place) {
     for (const std::string& name : support.obstacles)
       if (std::find(names.begin(), names.end(), name) == names.end())

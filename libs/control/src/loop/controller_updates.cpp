@@ -148,9 +148,7 @@ std::uint64_t Controller::detach(std::string_view name, const VectorXd& q) {
   const auto found = std::find_if(all.begin(), all.end(),
                                   [&](const auto& payload) { return payload.name == name; });
   if (found == all.end()) {
-    std::vector<std::string> names;
-    names.reserve(all.size());
-    for (const auto& payload : all) names.push_back(payload.name);
+    const std::vector<std::string> names = names_of(all);
     throw Error(ErrorCode::invalid,
                 fmt::format("payload '{}': is not attached, expected one of the {} that are{}",
                             name, names.size(), did_you_mean(name, names)));
@@ -161,9 +159,7 @@ std::uint64_t Controller::detach(std::string_view name, const VectorXd& q) {
 
 std::vector<std::string> Controller::attached() const {
   const std::lock_guard lock(load_mutex_);
-  std::vector<std::string> names;
-  for (const auto& payload : newest_load().payloads) names.push_back(payload.name);
-  return names;
+  return names_of(newest_load().payloads);
 }
 
 Controller::Carried Controller::newest_load() const {

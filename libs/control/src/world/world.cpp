@@ -58,9 +58,7 @@ std::size_t find_by_name(const std::vector<scene::Obstacle>& obstacles, std::str
 std::size_t require_name(const std::vector<scene::Obstacle>& obstacles, std::string_view name) {
   const std::size_t found = find_by_name(obstacles, name);
   if (found < obstacles.size()) return found;
-  std::vector<std::string> names;
-  names.reserve(obstacles.size());
-  for (const auto& obstacle : obstacles) names.push_back(obstacle.name);
+  const std::vector<std::string> names = names_of(obstacles);
   throw Error(ErrorCode::invalid,
               fmt::format("obstacle '{}': there is none of this name, expected one of the {} that "
                           "exist{}",

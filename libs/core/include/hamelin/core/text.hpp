@@ -24,4 +24,13 @@ namespace hamelin {
 [[nodiscard]] std::string did_you_mean(std::string_view name,
                                        const std::vector<std::string>& candidates);
 
+/// The member `name` of each element, in order.
+template <class List>
+[[nodiscard]] std::vector<std::string> names_of(const List& list) {
+  std::vector<std::string> names;
+  names.reserve(list.size());
+  for (const auto& each : list) names.push_back(each.name);
+  return names;
+}
+
 }  // namespace hamelin

@@ -17,12 +17,19 @@ using Json = nlohmann::ordered_json;
 /// object and for lists and objects nested deeper than 100
 [[nodiscard]] Json parse_json(std::string_view text, const std::string& where);
 
+/// Parses text that need not be JSON, such as what another process wrote. If it is none, the value
+/// `is_discarded()`.
+[[nodiscard]] Json try_parse_json(std::string_view text);
+
 /// Reads and parses a file. @throws Error io or parse
 [[nodiscard]] Json read_json(const std::filesystem::path& file);
 
 /// The text of a shipped JSON Schema (draft-07), e.g. schema_text("robot"); empty if no schema has
 /// that name.
 [[nodiscard]] std::string_view schema_text(std::string_view name);
+
+/// The shipped schema of that name, parsed. @throws Error usage if no schema has that name
+[[nodiscard]] Json shipped_schema(std::string_view name);
 
 /// A JSON Schema compiled once for checking many documents. Threads may share it.
 class Schema {
