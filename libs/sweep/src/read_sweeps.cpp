@@ -60,6 +60,9 @@ class LineReader {
                                              file.string()));
     return line;
   }
+  Json read_json(const RecordPlace& place) {
+    return parse_json(read(place), sweeps_.files[place.file].string());
+  }
 
  private:
   const Sweeps& sweeps_;
