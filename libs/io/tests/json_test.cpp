@@ -38,6 +38,13 @@ TEST_CASE("a parse error names file, line and column", "[io][unit]") {
   CHECK_THAT(parse("{\"a\": \"\xff\"}"), Catch::StartsWith("a.json: line 1, column"));
 }
 
+TEST_CASE("a text that need not be JSON is tried without an error", "[io][unit]") {
+  CHECK(try_parse_json("{\"a\": 1}")["a"] == 1);
+  CHECK(try_parse_json("null").is_null());
+  CHECK(try_parse_json("planner died").is_discarded());
+  CHECK(try_parse_json("").is_discarded());
+}
+
 TEST_CASE("a key given twice is refused at any depth, equal keys of different objects are not",
           "[io][unit]") {
   CHECK_THAT(
