@@ -56,7 +56,7 @@ endif()
 # logs would take an eighth more: the linker keeps one copy of each inline function, also for sources with -O3.
 set(HAMELIN_COLD_OPTIONS $<$<CONFIG:Release>:-O1>)
 
-option(HAMELIN_FURTHER_SOURCES "Compile also what `hamelin run` does not need" ON)
+option(HAMELIN_FURTHER_SOURCES "Compile also the sources that the commands of the demo do not need" ON)
 
 # hamelin_library(NAME model [DEPS geometry ...] [SOURCES src/a.cpp ...] [FURTHER src/b.cpp ...] [LINKS Eigen3::Eigen]
 #                 [PRIVATE_LINKS ...] [PACKAGES Eigen3 ...] [TEST_LINKS hamelin::io ...] [COLD] [INTERNAL])
@@ -64,7 +64,8 @@ option(HAMELIN_FURTHER_SOURCES "Compile also what `hamelin run` does not need" O
 # Defines hamelin::NAME in the calling folder: headers in include/hamelin/NAME, tests/*_test.cpp as
 # one test program, bench/*_bench.cpp as one benchmark program. A DEP must precede NAME in
 # libs/CMakeLists.txt, so the order there is the dependency order and cycles are impossible.
-# FURTHER are sources that a build without HAMELIN_FURTHER_SOURCES leaves out.
+# FURTHER are sources that the commands of the demo do not need; a build without
+# HAMELIN_FURTHER_SOURCES leaves them out.
 # PACKAGES are the packages that find_package(hamelin COMPONENTS NAME) must find for the libraries
 # in LINKS and PRIVATE_LINKS. TEST_LINKS are libraries that only the tests need; they may come later
 # than NAME. COLD marks a library that is not performance-critical and is compiled with less
@@ -176,10 +177,10 @@ foreach(name IN ITEMS baseline v3 v4)
   endif()
 endforeach()
 
-# hamelin_isa_sources(TARGET SOURCE... [FURTHER SOURCE...] [LINKS ...]): compiles each source once for every instruction
-# set of core/isa.hpp. docs/decisions/0006-instruction-sets.md says what such a source may use, and
-# a test checks the objects. Products may be contracted to FMA, because results are bit-identical on
-# one instruction set only.
+# hamelin_isa_sources(TARGET SOURCE... [FURTHER SOURCE...] [LINKS ...]): compiles each source once
+# for every instruction set of core/isa.hpp. docs/decisions/0006-instruction-sets.md says what such a
+# source may use, and a test checks the objects. Products may be contracted to FMA, because results
+# are bit-identical on one instruction set only.
 function(hamelin_isa_sources target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "FURTHER;LINKS")
   set(sources ${arg_UNPARSED_ARGUMENTS})

@@ -18,7 +18,7 @@ inline const model::Model::NamedFrame& named_frame(const char* function, const M
   return frames[static_cast<std::size_t>(frame)];
 }
 
-/// Frames of external wrenches.
+/// Refuses external wrenches on a frame that the model does not have.
 template <class Wrenches>
 void check_frames(const char* function, const Model& model, const Wrenches& wrenches) {
   for (const auto& each : wrenches) (void)named_frame(function, model, each.frame);
